@@ -1,0 +1,34 @@
+# `make demo` refines a sample mesh; `make test` runs everything. Both make their own .venv first.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: demo test lint goldens clean
+
+$(VENV)/demo.stamp: pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	touch $@
+
+$(VENV)/test.stamp: pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	touch $@
+
+demo: $(VENV)/demo.stamp
+	mkdir -p build
+	$(BIN)/curvify refine sample_meshes/pawn.obj build/pawn.ply --level 5
+	@echo "Wrote build/pawn.ply: 90 polygons became a smooth surface. Open it in any mesh viewer."
+
+lint: $(VENV)/test.stamp
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+test: lint
+	$(BIN)/python -m pytest
+
+goldens: $(VENV)/test.stamp
+	$(BIN)/python -m pytest tests/test_goldens.py --update-goldens
+
+clean:
+	rm -rf $(VENV) build

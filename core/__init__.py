@@ -1,0 +1,1 @@
+"""curvify: coarse polygon meshes in, dense meshes of smooth curved surfaces out."""

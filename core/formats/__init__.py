@@ -1,0 +1,1 @@
+"""Mesh files: one module per format, all read to and written from PolygonMesh."""
