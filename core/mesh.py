@@ -127,7 +127,9 @@ class PolygonMesh:
 
     def faces(self) -> list[list[int]]:
         """The faces as lists of vertex ids: for small meshes and tests."""
-        return [part.tolist() for part in np.split(self.face_vertices, self.face_offsets[1:-1])] if self.face_count else []
+        if not self.face_count:
+            return []
+        return [part.tolist() for part in np.split(self.face_vertices, self.face_offsets[1:-1])]
 
     def with_(self, **changes: object) -> PolygonMesh:
         """A copy that differs in the named fields (arrays are shared)."""

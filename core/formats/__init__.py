@@ -1,1 +1,117 @@
 """Mesh files: one module per format, all read to and written from PolygonMesh."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import BinaryIO
+
+from curvify.errors import FormatError
+from curvify.formats.files import atomic_file, read_bytes
+from curvify.formats.obj import read_obj, write_obj
+from curvify.formats.obj_write import FloatType
+from curvify.formats.off import read_off, write_off
+from curvify.formats.others import READABLE, WRITABLE, read_other, write_other
+from curvify.formats.ply import read_ply, write_ply
+from curvify.mesh import PolygonMesh
+
+__all__ = [
+    "READ_FORMATS",
+    "WRITE_FORMATS",
+    "atomic_file",
+    "find_format",
+    "read_mesh",
+    "write_mesh",
+]
+
+_OWN = ("obj", "ply", "off")
+READ_FORMATS = (*_OWN, *READABLE)
+WRITE_FORMATS = (*_OWN, *WRITABLE)
+
+
+def find_format(path: str | os.PathLike[str], format: str | None, known: tuple[str, ...]) -> str:
+    """The format that ``format`` names, or the suffix of ``path``; raises FormatError unless it is known."""
+    name = os.fspath(path)
+    chosen = (format if format is not None else Path(name).suffix).lower().removeprefix(".")
+    if chosen in known:
+        return chosen
+    listed = ", ".join(known)
+    if format is not None:
+        raise FormatError(f"unknown format '{format}'; known are {listed}")
+    if name == "-":
+        raise FormatError(f"the format of standard input or output must be given, one of {listed}")
+    what = f"unknown suffix '.{chosen}'" if chosen else "the name has no suffix"
+    raise FormatError(f"{name}: {what}; name the format, one of {listed}")
+
+
+def read_mesh(
+    path: str | os.PathLike[str], format: str | None = None, stdin: BinaryIO | None = None
+) -> PolygonMesh:
+    """Read a mesh file; ``-`` reads ``stdin`` (by default the process's).
+
+    The format is ``format``, or told by the suffix; PLY and OFF on standard input are recognised.
+    Raises FormatError, one clear line, for whatever cannot be read.
+    """
+    name = os.fspath(path)
+    if name != "-":
+        chosen = find_format(name, format, READ_FORMATS)
+        data = read_bytes(name)
+    else:
+        name = "stdin"
+        try:
+            data = (stdin or sys.stdin.buffer).read()
+        except OSError as error:
+            raise FormatError(f"stdin: cannot read: {error.strerror}") from None
+        chosen = find_format("-", format or _sniff(data), READ_FORMATS)
+    if chosen == "obj":
+        return read_obj(data, name)
+    if chosen == "ply":
+        return read_ply(data, name)
+    if chosen == "off":
+        return read_off(data, name)
+    return read_other(data, name, chosen)
+
+
+def _sniff(data: bytes) -> str | None:
+    """The format that the first bytes give away, if any."""
+    if data[:4] in (b"ply\n", b"ply\r"):
+        return "ply"
+    head = data[:16].split(maxsplit=1)
+    return "off" if head and head[0] in (b"OFF", b"COFF", b"NOFF", b"CNOFF") else None
+
+
+def write_mesh(
+    mesh: PolygonMesh,
+    path: str | os.PathLike[str],
+    format: str | None = None,
+    *,
+    ascii: bool = False,
+    dtype: FloatType | None = None,
+    stdout: BinaryIO | None = None,
+) -> None:
+    """Write a mesh file, completely or not at all; ``-`` writes ``stdout`` (by default the process's).
+
+    ``ascii`` makes PLY text; ``dtype`` (float32, float64; by default ``mesh.position_dtype``) is the
+    type of coordinates in PLY, and the one that digits in OBJ and OFF round-trip.
+    Raises FormatError for an unknown format or a target that cannot be written.
+    """
+    chosen = find_format(path, format, WRITE_FORMATS)
+    if os.fspath(path) == "-":
+        out = stdout or sys.stdout.buffer
+        _write(mesh, out, chosen, ascii, dtype)
+        out.flush()
+        return
+    with atomic_file(path) as out:
+        _write(mesh, out, chosen, ascii, dtype)
+
+
+def _write(mesh: PolygonMesh, out: BinaryIO, format: str, ascii: bool, dtype: FloatType | None) -> None:
+    if format == "obj":
+        write_obj(mesh, out, dtype)
+    elif format == "ply":
+        write_ply(mesh, out, ascii, dtype)
+    elif format == "off":
+        write_off(mesh, out, dtype)
+    else:
+        write_other(mesh, out, format)

@@ -1,0 +1,338 @@
+"""The CPU backend: control vectors times basis tables, in chunks that stay in cache.
+
+Everything that is not linear in a patch depends on one variable and lives on its sides, so a few values of each
+side field, at Chebyshev points, stand beside the control vectors, and matrix products with one table give
+position and both derivatives. How many points a patch needs is read off the fields' Chebyshev coefficients; where
+no count will do, the fields are evaluated at every sample. Float64 throughout, chunks of fixed size, the last one
+padded: the same bytes for any number of threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from curvify.mesh import Floats, Ints
+from curvify.normals import unit
+from curvify.sampling import Sampling
+from curvify.schemes.base import Basis, Controls, Form, PatchClass, Patches, bernstein_basis
+from curvify.schemes.domain import domain_jets
+
+#: Numbers of Chebyshev points tried, fewest first.
+NODE_COUNTS = (16, 24, 32, 48)
+#: Chebyshev coefficients at the end of the series that must be small.
+TAIL = 4
+#: Samples of a patch evaluated with one table, so that the table stays in cache.
+SAMPLES = 2048
+#: From this many sides the fields are evaluated at every sample: the tables would be too large.
+MANY_SIDES = 17
+#: Squared sine below which two derivatives count as parallel.
+PARALLEL = 1e-24
+#: Tables larger than this many numbers are built when needed and not kept.
+KEPT_TABLE = 1 << 20
+
+
+def chebyshev_points(count: int) -> Floats:
+    """Chebyshev-Lobatto points ``(m,)`` of [0, 1], ascending, ends included."""
+    return np.sin(0.5 * np.pi * np.arange(count) / (count - 1)) ** 2
+
+
+@lru_cache(maxsize=8)
+def _tail_matrix(count: int) -> Floats:
+    """Values at the Chebyshev points to the last coefficients of their series ``(m, TAIL)``."""
+    j = np.arange(count)
+    order = j[-TAIL:]
+    matrix = np.cos(np.pi * np.outer(count - 1 - j, order) / (count - 1)) * 2 / (count - 1)
+    matrix[[0, -1]] /= 2
+    matrix[:, order == count - 1] /= 2
+    return matrix
+
+
+def lagrange(count: int, t: Floats) -> tuple[Floats, Floats]:
+    """Lagrange polynomials at the Chebyshev points and their derivatives at ``t (...)``: ``(...,m)`` each."""
+    nodes = chebyshev_points(count)
+    sign = (-1.0) ** np.arange(count)
+    sign[[0, -1]] /= 2
+    gap = t[..., None] - nodes
+    at_node = np.abs(gap) < 1e-14
+    terms = sign / np.where(at_node, 1.0, gap)
+    values = terms / terms.sum(axis=-1, keepdims=True)
+    hit = at_node.any(axis=-1)
+    values[hit] = at_node[hit]
+    return values, values @ _differentiation(count)
+
+
+@lru_cache(maxsize=8)
+def _differentiation(count: int) -> Floats:
+    """Matrix ``(m,m)``: row i holds the derivatives at node i of the Lagrange polynomials."""
+    nodes = chebyshev_points(count)
+    sign = (-1.0) ** np.arange(count)
+    sign[[0, -1]] /= 2
+    gap = nodes[:, None] - nodes
+    np.fill_diagonal(gap, 1.0)
+    matrix = (sign / sign[:, None]) / gap
+    np.fill_diagonal(matrix, 0.0)
+    np.fill_diagonal(matrix, -matrix.sum(axis=1))
+    return matrix
+
+
+# --- tables -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """Tables of one form at the samples ``first`` to ``last`` of a patch.
+
+    ``matrix (K, o*S)`` for control vectors followed by field values, o = 3 orders (value, by xi, by eta) or 1;
+    for ``count`` 0 it has the control vectors only, and ``basis`` serves the fields.
+    """
+
+    first: int
+    last: int
+    count: int
+    matrix: Floats
+    basis: Basis
+
+
+_CACHE: dict[tuple[object, ...], Tables] = {}
+
+
+def tables(form: Form, points: Floats, grid: tuple[int, int], count: int, orders: int) -> Iterator[Tables]:
+    """Tables of a form at all interior ``points (S,2)`` of a sampling, block by block.
+
+    ``grid`` (sides, level) names the sampling in the cache, ``count`` is the number of Chebyshev points.
+    """
+    for first in range(0, len(points), SAMPLES):
+        key = (form.key, grid, count, orders, first)
+        found = _CACHE.get(key)
+        if found is None:
+            last = min(first + SAMPLES, len(points))
+            found = _make_tables(form.basis(points[first:last]), first, last, count, orders)
+            if found.matrix.size <= KEPT_TABLE:
+                if len(_CACHE) >= 64:
+                    _CACHE.pop(next(iter(_CACHE)), None)
+                _CACHE[key] = found
+        yield found
+
+
+def _make_tables(basis: Basis, first: int, last: int, count: int, orders: int) -> Tables:
+    samples, sides = basis.weights.shape[1:]
+    linear = basis.linear[:orders]
+    columns = linear.shape[2]
+    table = np.empty((columns + sides * count, orders, samples))
+    table[:columns] = linear.transpose(2, 0, 1)
+    if count and sides:
+        values, slopes = lagrange(count, basis.abscissae[0])
+        weights, u = basis.weights[:orders, :, :, None], basis.abscissae[:orders, :, :, None]
+        fields = np.empty((orders, samples, sides, count))
+        fields[0] = weights[0] * values
+        fields[1:] = weights[1:] * values + weights[0] * u[1:] * slopes
+        table[columns:] = fields.reshape(orders, samples, -1).transpose(2, 0, 1)
+    matrix = np.ascontiguousarray(table.reshape(len(table), -1))
+    return Tables(first, last, count, matrix, basis)
+
+
+# --- patches ------------------------------------------------------------------------------------------------
+
+
+def chunk_size(samples: int) -> int:
+    """Patches evaluated at once: 10 to 20 thousand samples, which fit the cache with their work arrays."""
+    return 16 * int(np.clip(round(1000 / max(samples, 1)), 1, 16))
+
+
+def choose_counts(controls: Controls, sides: int, tolerance: float) -> tuple[Ints, dict[int, Floats]]:
+    """Chebyshev points each patch needs ``(f,)``, 0 where none suffice, and the field values tried, by count.
+
+    Accepts a count when the last coefficients of every field are below ``tolerance``.
+    """
+    patches = controls.linear.shape[1]
+    counts = np.zeros(patches, dtype=np.int64)
+    values: dict[int, Floats] = {}
+    if sides >= MANY_SIDES:
+        return counts, values
+    for count in NODE_COUNTS:
+        values[count] = controls.fields(chebyshev_points(count))
+        size = np.abs(values[count] @ _tail_matrix(count)).max(axis=(0, 2, 3))
+        counts[(counts == 0) & (size <= tolerance)] = count
+        if counts.all():
+            break
+    return counts, values
+
+
+def fill_patches(
+    patches: Patches,
+    patch_class: PatchClass,
+    rows: Ints,
+    sampling: Sampling,
+    level: int,
+    tolerance: float,
+    positions: Floats,
+    normals: Floats,
+) -> None:
+    """Write positions and unit normals of some patches of a class into ``positions``, ``normals (f,S,3)``.
+
+    ``rows (f,)`` index the class. Samples whose derivatives are parallel get the blend of the corner normals.
+    """
+    if not len(sampling.points):
+        return
+    grid, exact = (patch_class.sides, level), patch_class.normals is None
+    orders = 3 if exact else 1
+    for place, values in _evaluate_form(patch_class.surface, rows, sampling.points, grid, tolerance, orders):
+        _store(positions, place, values[0])
+        if exact:
+            normal, parallel = _cross_normals(values[1], values[2])
+            _store(normals, place, normal)
+            if parallel is not None:
+                face, sample = parallel
+                ids, points = patch_class.patches[rows[place[0][face]]], sampling.points[place[1]][sample]
+                normals[place[0][face], place[1].start + sample] = blended_normals(patches, ids, points)
+    if patch_class.normals is not None:
+        for place, values in _evaluate_form(patch_class.normals, rows, sampling.points, grid, tolerance, 1):
+            _store(normals, place, _unit_rows(values[0]))
+
+
+def _store(out: Floats, place: tuple[Ints, slice], values: Floats) -> None:
+    """Write ``values (3,f,S)`` to the patches and samples of ``place`` in ``out (F,S,3)``."""
+    rows, samples = place
+    together = len(rows) and rows[-1] - rows[0] == len(rows) - 1
+    part = slice(rows[0], rows[-1] + 1) if together else rows
+    for i in range(3):
+        out[part, samples, i] = values[i]
+
+
+def _cross_normals(a: Floats, b: Floats) -> tuple[Floats, tuple[Ints, Ints] | None]:
+    """Unit cross products ``(3,f,S)`` of vectors ``(3,f,S)``, and where they are parallel, if anywhere."""
+    normal = np.empty(a.shape)
+    work = np.empty(a.shape[1:])
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        np.multiply(a[j], b[k], out=normal[i])
+        np.multiply(a[k], b[j], out=work)
+        normal[i] -= work
+    square = np.einsum("cfs,cfs->fs", normal, normal)
+    parallel: tuple[Ints, Ints] | None = None
+    if square.min() <= PARALLEL * square.max():
+        speeds = np.einsum("cfs,cfs->fs", a, a) * np.einsum("cfs,cfs->fs", b, b)
+        found = square <= PARALLEL * speeds
+        if found.any():
+            face, sample = np.nonzero(found)
+            parallel = face, sample
+        square[found] = 1.0
+    np.sqrt(square, out=square)
+    normal /= square
+    return normal, parallel
+
+
+def _unit_rows(vectors: Floats) -> Floats:
+    """Vectors ``(3,...)`` scaled to length 1, zero where they have none."""
+    length = np.sqrt(np.einsum("c...,c...->...", vectors, vectors))
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+
+
+def _evaluate_form(
+    form: Form, rows: Ints, points: Floats, grid: tuple[int, int], tolerance: float, orders: int
+) -> Iterator[tuple[tuple[Ints, slice], Floats]]:
+    """Values ``(o,3,f,S)`` of a form, with the index of the patches and samples they belong to."""
+    controls = form.controls(rows)
+    sides = grid[0]
+    counts, nodes = choose_counts(controls, sides, tolerance)
+    size = chunk_size(min(len(points), SAMPLES))
+    for count in np.unique(counts):
+        group = np.flatnonzero(counts == count)
+        for block in tables(form, points, grid, int(count), orders):
+            for begin in range(0, len(group), size):
+                part = group[begin : begin + size]
+                if count:
+                    values = _chunk(controls.linear, nodes[int(count)], part, size, block, orders)
+                else:
+                    values = exact_values(form.controls(rows[part]), block.basis, orders)
+                yield (part, slice(block.first, block.last)), values
+
+
+def _chunk(linear: Floats, nodes: Floats, part: Ints, size: int, block: Tables, orders: int) -> Floats:
+    """One matrix product for a chunk, padded to its fixed size by its last patch."""
+    padded = np.concatenate([part, np.repeat(part[-1:], size - len(part))])
+    columns = linear.shape[2]
+    vectors = np.empty((3, size, len(block.matrix)))
+    vectors[..., :columns] = linear[:, padded]
+    vectors[..., columns:] = nodes[:, padded].reshape(3, size, -1)
+    product = vectors.reshape(3 * size, -1) @ block.matrix
+    samples = block.last - block.first
+    return product.reshape(3, size, orders, samples)[:, : len(part)].transpose(2, 0, 1, 3)
+
+
+def exact_values(controls: Controls, basis: Basis, orders: int = 3) -> Floats:
+    """Values ``(o,3,f,S)`` of patches at shared points, the fields evaluated at every sample."""
+    linear = np.moveaxis(basis.linear[:orders], 0, -1)
+    total = np.moveaxis(np.einsum("cfl,slo->cfso", controls.linear, linear, optimize=True), -1, 0)
+    if basis.weights.shape[2]:
+        t = np.ascontiguousarray(basis.abscissae[0].T)
+        weights, u = basis.weights.transpose(0, 2, 1), basis.abscissae.transpose(0, 2, 1)
+        if orders == 1:
+            total[0] += np.einsum("cfks,ks->cfs", controls.fields(t), weights[0])
+            return total
+        values, slopes = controls.field_derivatives(t)
+        total[0] += np.einsum("cfks,ks->cfs", values, weights[0])
+        for order in (1, 2):
+            total[order] += np.einsum("cfks,ks->cfs", values, weights[order])
+            total[order] += np.einsum("cfks,ks->cfs", slopes, weights[0] * u[order])
+    return total
+
+
+def evaluate_at(patches: Patches, ids: Ints, points: Floats) -> tuple[Floats, Floats, Floats]:
+    """Position and derivatives by xi and eta ``(m,3)`` of patches ``ids (m,)`` at domain points ``(m,2)`` of
+    their own: exact, for any points of the closed domain.
+    """
+    result = np.empty((3, len(ids), 3))
+    for patch_class in patches.classes:
+        mine = np.flatnonzero(np.isin(ids, patch_class.patches))
+        for begin in range(0, len(mine), SAMPLES):
+            part = mine[begin : begin + SAMPLES]
+            rows = np.searchsorted(patch_class.patches, ids[part])
+            basis = patch_class.surface.basis(points[part])
+            controls = patch_class.surface.controls(rows)
+            total = np.einsum("cql,oql->oqc", controls.linear, basis.linear)
+            if basis.weights.shape[2]:
+                values, slopes = (
+                    f[..., 0] for f in controls.field_derivatives(basis.abscissae[0][:, :, None])
+                )
+                total += np.einsum("cqk,oqk->oqc", values, basis.weights)
+                for order in (1, 2):
+                    chain = basis.weights[0] * basis.abscissae[order]
+                    total[order] += np.einsum("cqk,qk->qc", slopes, chain)
+            result[:, part] = total
+    return result[0], result[1], result[2]
+
+
+def blended_normals(patches: Patches, ids: Ints, points: Floats) -> Floats:
+    """Corner normals of patches blended over their domains ``(m,3)``: for where derivatives are parallel."""
+    result = np.empty((len(ids), 3))
+    for patch_class in patches.classes:
+        mine = np.flatnonzero(np.isin(ids, patch_class.patches))
+        if len(mine):
+            corners = patches.topology.offsets[ids[mine]][:, None] + np.arange(patch_class.sides)
+            weights = domain_jets(patch_class.sides, points[mine]).w[0]
+            result[mine] = unit(np.einsum("qki,kq->qi", patches.normals[corners], weights))
+    return result
+
+
+# --- edges --------------------------------------------------------------------------------------------------
+
+
+def edge_points(curves: Floats, t: Floats) -> Floats:
+    """Points ``(e,m,3)`` of Bezier curves ``(e,d+1,3)`` at ``t (m,)``, in plain elementwise arithmetic: an edge
+    gets the same bits wherever it stands.
+    """
+    basis = bernstein_basis(curves.shape[1] - 1, t)
+    total = curves[:, None, 0] * basis[0][:, None]
+    for i in range(1, len(basis)):
+        total += curves[:, None, i] * basis[i][:, None]
+    return total
+
+
+def edge_normals(fields: Floats, t: Floats) -> Floats:
+    """Unit normals ``(e,m,3)`` of Bezier normal fields ``(e,q+1,3)`` at ``t (m,)``."""
+    return unit(edge_points(fields, t))

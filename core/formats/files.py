@@ -1,0 +1,111 @@
+"""Opening files: whole reads with plain errors, and output that appears complete or not at all."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import secrets
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+from curvify.errors import FormatError
+
+_OWN_STREAM = re.compile(r"/dev/(?:stdin|stdout|stderr|fd/\d+)\Z|/proc/self/fd/\d+\Z")
+_NAMED_STREAMS = {"stdin": 0, "stdout": 1, "stderr": 2}
+_NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
+
+
+def _explain(path: str, verb: str, error: OSError) -> FormatError:
+    """One clear line for an operating system error."""
+    if isinstance(error, FileNotFoundError):
+        what = "there is no such file" if verb == "read" else "its folder does not exist; make it first"
+    elif isinstance(error, IsADirectoryError):
+        what = "it is a folder; give the name of a file"
+    elif isinstance(error, PermissionError):
+        what = "permission denied"
+    else:
+        what = (error.strerror or str(error)).lower()
+    return FormatError(f"{path}: cannot {verb}: {what}")
+
+
+def read_bytes(path: str) -> bytes:
+    """The whole content of a file. Raises FormatError where it cannot be read."""
+    try:
+        return Path(path).read_bytes()
+    except ValueError:  # an embedded null character
+        raise FormatError(f"{path!r}: cannot read: that is not a file name") from None
+    except OSError as error:
+        raise _explain(path, "read", error) from None
+
+
+@contextmanager
+def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+    """An open binary file whose content takes the place of ``path`` when the block ends well.
+
+    Until then everything goes to a temporary file beside the target, which is removed if the block
+    raises anything (KeyboardInterrupt too). The file may be filled through its descriptor
+    (``os.pwrite``) or through ``write``, not both without a flush between. A new file gets the
+    umask's permissions, a replaced one keeps its own; a symbolic link stays and its target changes.
+
+    A device, a pipe or one of the process's own streams (``/dev/stdout``) is written straight: ask
+    ``seekable()`` before using positions, and add ``tell()`` as it is on entry.
+    Raises FormatError where the target cannot be written or there is no room.
+    """
+    name = os.fspath(path)
+    temporary = target = None
+    try:
+        opened = _open_stream(name)
+        if opened is None:
+            opened, temporary, target = _open_beside(name)
+    except ValueError:
+        raise FormatError(f"{name!r}: cannot write: that is not a file name") from None
+    except OSError as error:
+        raise _explain(name, "write", error) from None
+    try:
+        with opened:
+            yield opened
+        if temporary and target:
+            temporary.replace(target)
+    except BaseException as error:
+        if temporary:
+            with suppress(OSError):
+                temporary.unlink()
+        if isinstance(error, OSError) and error.errno in _NO_ROOM:
+            raise _explain(name, "write", error) from None
+        raise
+
+
+def _open_stream(name: str) -> BinaryIO | None:
+    """The target itself where it is not a regular file, None where it is or will be one."""
+    full = str(Path.cwd() / name) if name else name
+    if _OWN_STREAM.match(full):
+        last = full.rsplit("/", 1)[1]
+        # A duplicate keeps the stream's place: opening the name again would start over at 0.
+        return os.fdopen(os.dup(_NAMED_STREAMS[last] if last in _NAMED_STREAMS else int(last)), "wb")
+    try:
+        mode = Path(name).stat().st_mode
+    except FileNotFoundError:
+        return None
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, "is a directory", name)
+    if stat.S_ISREG(mode):
+        if not os.access(name, os.W_OK):
+            raise PermissionError(errno.EACCES, "permission denied", name)
+        return None
+    return Path(name).open("wb")
+
+
+def _open_beside(name: str) -> tuple[BinaryIO, Path, Path]:
+    """A new temporary file in the folder of the target: file, its path, the target's path."""
+    if not name or name.endswith("/"):
+        raise IsADirectoryError(errno.EISDIR, "is a directory", name)
+    target = Path(os.path.realpath(name))
+    temporary = target.parent / f".curvify-{secrets.token_hex(6)}.part"
+    descriptor = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    with suppress(OSError):
+        temporary.chmod(stat.S_IMODE(target.stat().st_mode))
+    return os.fdopen(descriptor, "w+b"), temporary, target

@@ -1,0 +1,233 @@
+"""Every other mesh format (STL, GLB, 3MF, ...) through trimesh, which is imported when it is needed."""
+
+from __future__ import annotations
+
+import io
+import logging
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from curvify.errors import FormatError
+from curvify.formats.obj_write import round_to
+from curvify.formats.wedges import split_vertices, wedge_rows
+from curvify.mesh import Floats, Ints, PolygonMesh
+
+READABLE = ("stl", "glb", "gltf", "3mf", "dae")
+WRITABLE = ("stl", "glb", "dae", "3mf")
+
+
+@dataclass
+class _Part:
+    """One triangle mesh of a scene, in its place: ``faces (F,3)``, the others one row for each vertex."""
+
+    positions: Floats
+    faces: Ints
+    normals: Floats | None
+    uvs: Floats | None
+    colors: NDArray[np.generic] | None
+
+
+def _import_trimesh() -> Any:
+    import trimesh
+
+    # Without a handler of its own, what the library logs would go to standard error.
+    logging.getLogger("trimesh").addHandler(logging.NullHandler())
+    return trimesh
+
+
+def read_other(data: bytes, name: str, format: str) -> PolygonMesh:
+    """Parse a file of one of the ``READABLE`` formats into a triangle mesh.
+
+    All parts of a scene are put together, transformed. Vertices stay as the file has them, not merged.
+    Normals, uvs and vertex colors are kept where every part has them.
+    Raises FormatError for whatever trimesh cannot read.
+    """
+    trimesh = _import_trimesh()
+    try:
+        parts = _parts(trimesh.load(io.BytesIO(data), file_type=format, process=False), trimesh)
+    except ImportError as error:
+        raise FormatError(f"{name}: reading {format} needs another package: {_one_line(error)}") from None
+    except Exception as error:
+        raise FormatError(f"{name}: this cannot be read as {format}: {_one_line(error)}") from None
+    if not parts:
+        raise FormatError(f"{name}: the file holds no triangles")
+    return _join(parts, name)
+
+
+def _one_line(error: Exception) -> str:
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text[:200]
+
+
+def _parts(loaded: Any, trimesh: Any) -> list[_Part]:
+    """The triangle meshes of whatever trimesh returned, in the place that the scene gives them."""
+    if not isinstance(loaded, trimesh.Scene):
+        placed = [(np.eye(4), loaded)]
+    else:
+        nodes = [loaded.graph[node] for node in loaded.graph.nodes_geometry]
+        placed = [(np.asarray(matrix), loaded.geometry[key]) for matrix, key in nodes]
+    return [_place(m, g) for m, g in placed if isinstance(g, trimesh.Trimesh) and len(g.faces)]
+
+
+def _place(matrix: Floats, geometry: Any) -> _Part:
+    positions = np.asarray(geometry.vertices, dtype=np.float64).reshape(-1, 3)
+    faces = np.asarray(geometry.faces, dtype=np.int64).reshape(-1, 3)
+    normals = _stored_normals(geometry)
+    linear = matrix[:3, :3]
+    if not np.array_equal(matrix, np.eye(4)):
+        positions = positions @ linear.T + matrix[:3, 3]
+        if normals is not None:
+            normals = _unit(normals @ np.linalg.pinv(linear))
+    if np.linalg.det(linear) < 0:
+        faces = faces[:, ::-1]
+    kind = getattr(geometry.visual, "kind", None)
+    colors = np.asarray(geometry.visual.vertex_colors, dtype=np.uint8) if kind == "vertex" else None
+    return _Part(positions, faces, normals, _stored_uvs(geometry), colors)
+
+
+def _unit(rows: Floats) -> Floats:
+    lengths = np.linalg.norm(rows, axis=1, keepdims=True)
+    return rows / np.where(lengths > 0, lengths, 1)
+
+
+def _join(parts: list[_Part], name: str) -> PolygonMesh:
+    """One mesh of several."""
+    starts = np.cumsum([0] + [len(part.positions) for part in parts])
+    positions = np.concatenate([part.positions for part in parts])
+    corners = np.concatenate([part.faces + s for part, s in zip(parts, starts, strict=False)]).reshape(-1)
+    wild = np.flatnonzero(~np.isfinite(positions).all(axis=1))
+    if len(wild):
+        raise FormatError(
+            f"{name}: vertex {wild[0]} has a coordinate that is not a finite number; remove or mend it"
+        )
+    wrong = corners[(corners < 0) | (corners >= len(positions))]
+    if len(wrong):
+        raise FormatError(
+            f"{name}: a face refers to vertex {wrong[0]}, the file has {len(positions)} (counted from 0)"
+        )
+    normals = _stack([part.normals for part in parts])
+    if normals is not None:
+        normals[~(np.isfinite(normals).all(axis=1) & normals.any(axis=1))] = np.nan
+    uvs = _stack([part.uvs for part in parts])
+    return PolygonMesh(
+        positions,
+        np.arange(len(corners) // 3 + 1, dtype=np.int64) * 3,
+        corners,
+        corner_normals=None if normals is None or np.isnan(normals).all() else normals[corners],
+        corner_uvs=None if uvs is None else uvs[corners],
+        vertex_colors=_stack([part.colors for part in parts]),
+        position_dtype=np.dtype(np.float32),
+    )
+
+
+def _stack(arrays: list[Any]) -> Any:
+    """The arrays one after the other, or None unless every part has one."""
+    present = [array for array in arrays if array is not None]
+    return np.concatenate(present) if len(present) == len(arrays) else None
+
+
+def _stored_normals(part: Any) -> Floats | None:
+    """Vertex normals that the file itself has: trimesh would make some up otherwise."""
+    if "vertex_normals" not in part._cache:
+        return None
+    normals = np.array(part.vertex_normals, dtype=np.float64)
+    return normals if normals.shape == part.vertices.shape else None
+
+
+def _stored_uvs(part: Any) -> Floats | None:
+    uv = getattr(part.visual, "uv", None)
+    if uv is None or np.shape(uv) != (len(part.vertices), 2):
+        return None
+    return np.array(uv, dtype=np.float64)
+
+
+def write_other(mesh: PolygonMesh, out: BinaryIO, format: str) -> None:
+    """Write ``mesh`` in one of the ``WRITABLE`` formats, polygons cut into triangles.
+
+    Positions are rounded to float32, as most of these formats store them. Normals, uvs and colors go
+    along where the format has them. Raises FormatError where trimesh cannot write.
+    """
+    trimesh = _import_trimesh()
+    single = np.dtype(np.float32)
+    round_to(mesh.positions, single)
+    wedges = split_vertices(mesh, single)
+    triangles = wedges.face_wedges[triangulate(mesh)]
+    attributes: dict[str, Any] = {}
+    if mesh.corner_normals is not None:
+        attributes["vertex_normals"] = wedge_rows(wedges, mesh.corner_normals, 0.0)
+    if mesh.corner_uvs is not None:
+        attributes["visual"] = _texture(wedge_rows(wedges, mesh.corner_uvs, 0.0))
+    elif mesh.vertex_colors is not None:
+        attributes["vertex_colors"] = _byte_colors(mesh.vertex_colors)[wedges.vertices]
+    try:
+        made = trimesh.Trimesh(mesh.positions[wedges.vertices], triangles, process=False, **attributes)
+        content: Any = made.export(file_type=format)
+    except Exception as error:
+        raise FormatError(f"writing {format} failed: {_one_line(error)}") from None
+    out.write(content.encode() if isinstance(content, str) else content)
+
+
+def _texture(uvs: Floats) -> Any:
+    """Texture coordinates without a texture: any other material would want an image library."""
+    from trimesh.visual import TextureVisuals, material
+
+    textured: Any = TextureVisuals
+    plain: Any = material.PBRMaterial
+    return textured(uv=uvs, material=plain())
+
+
+def _byte_colors(colors: NDArray[np.generic]) -> NDArray[np.uint8]:
+    if colors.dtype.kind != "f":
+        return colors.astype(np.uint8)
+    return np.rint(np.clip(colors.astype(np.float64), 0, 1) * 255).astype(np.uint8)
+
+
+def triangulate(mesh: PolygonMesh) -> Ints:
+    """Corners ``(T,3)`` of triangles that cover the faces, in face order: n-2 for a face with n corners."""
+    sizes, starts = mesh.face_sizes, mesh.face_offsets[:-1]
+    offsets = np.concatenate([[0], np.cumsum(np.maximum(sizes - 2, 0))])
+    out = np.empty((int(offsets[-1]), 3), dtype=np.int64)
+    for size in np.unique(sizes[sizes >= 3]).tolist():
+        faces = np.flatnonzero(sizes == size)
+        corners = starts[faces, None] + np.arange(size)
+        local = _local_triangles(mesh.positions[mesh.face_vertices[corners]])
+        rows = offsets[faces, None] + np.arange(size - 2)
+        out[rows] = starts[faces, None, None] + local
+    return out
+
+
+def _local_triangles(points: Floats) -> Ints:
+    """Triangles ``(F,n-2,3)`` of polygons ``(F,n,3)``: fans where those do not fold, ears elsewhere."""
+    count, size, _ = points.shape
+    steps = np.arange(1, size - 1)
+    fan = np.stack([np.zeros_like(steps), steps, steps + 1], axis=1)
+    local = np.tile(fan, (count, 1, 1))
+    if size == 3:
+        return local
+    area = np.cross(points, np.roll(points, -1, axis=1)).sum(axis=1)
+    a, b, c = (points[:, fan[:, k]] for k in range(3))
+    facing = np.einsum("fti,fi->ft", np.cross(b - a, c - a), area)
+    for face in np.flatnonzero((facing <= 0).any(axis=1)).tolist():
+        ears = _ears(points[face], area[face])
+        if ears is not None:
+            local[face] = ears
+    return local
+
+
+def _ears(points: Floats, normal: Floats) -> Ints | None:
+    """Triangles of one polygon by ear clipping in its plane; None where that does not cover it."""
+    import mapbox_earcut
+
+    drop = int(np.argmax(np.abs(normal)))
+    flat = np.delete(points, drop, axis=1).astype(np.float64)
+    indices = mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], dtype=np.uint32))
+    triangles = np.asarray(indices, dtype=np.int64).reshape(-1, 3)
+    if len(triangles) != len(points) - 2:
+        return None
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    turned = np.cross(b - a, c - a) @ normal < 0
+    triangles[turned] = triangles[turned][:, ::-1]
+    return triangles

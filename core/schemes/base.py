@@ -1,0 +1,146 @@
+"""What a scheme gives and a backend evaluates: control vectors times basis tables.
+
+A surface form over a polygon domain is
+
+    G(x) = sum_i linear_i(x) c_i  +  sum_k weight_k(x) T_k(u_k(x))
+
+with control vectors ``c_i`` and side fields ``T_k`` that depend on one variable. Most schemes have no side
+fields. A backend multiplies tables and control vectors; it needs to know nothing else about a scheme.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from curvify.mesh import Floats, Ints, PolygonMesh
+from curvify.sampling import Sampling
+from curvify.topology import Topology
+
+
+@dataclass(eq=False)
+class Basis:
+    """A basis at ``S`` points of a domain; leading axis: value, derivative by xi, derivative by eta.
+
+    ``linear (3,S,L)``; ``weights (3,S,n)`` of the side fields and ``abscissae (3,S,n)``, where on its side each
+    field is taken. Schemes without side fields have n = 0 there.
+    """
+
+    linear: Floats
+    weights: Floats
+    abscissae: Floats
+
+
+class Controls(Protocol):
+    """Control data of some faces of one class."""
+
+    @property
+    def linear(self) -> Floats:
+        """Control vectors ``(3,f,L)``."""
+
+    def fields(self, t: Floats) -> Floats:
+        """Side fields ``(3,f,n,m)`` at abscissae ``t (m,)`` or ``(...,n,m)`` per side."""
+
+    def field_derivatives(self, t: Floats) -> tuple[Floats, Floats]:
+        """Side fields and their derivatives, each ``(3,f,n,m)``, at ``t`` as above."""
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """A vector function on the faces of one class.
+
+    ``key`` identifies the basis (for caches); ``basis(points (S,2))`` gives its tables;
+    ``controls(rows)`` the control data of some of the class's faces.
+    """
+
+    key: Hashable
+    basis: Callable[[Floats], Basis]
+    controls: Callable[[Ints], Controls]
+
+
+@dataclass(frozen=True, eq=False)
+class PatchClass:
+    """Patches that share their tables: ``patches (f,)`` ids, ascending, all with ``sides`` sides.
+
+    ``normals`` is None where normals are the cross product of the surface's derivatives.
+    """
+
+    sides: int
+    patches: Ints
+    surface: Form
+    normals: Form | None = None
+
+
+@dataclass(eq=False)
+class Patches:
+    """A mesh's surface, ready to evaluate.
+
+    ``positions (V,3)`` of the input's vertices, ``stand_in (V,)`` the vertex that each was welded to; ``topology`` of
+    the patches (a face may be cut into several); ``source_faces (P,)`` the input face of each patch, ascending;
+    ``source_corners (C,)`` the input corner of each patch corner. The last D edges lie inside cut faces,
+    ``inner_faces (D,)``, ascending. ``curves (E,d+1,3)`` Bezier points of the edges; ``fields (N,q+1,3)`` Bezier
+    points of edge normals, not of unit length, the first E those of the edges' first half-edges, and
+    ``side_field (C,)`` the one on each half-edge; ``normals (C,3)`` unit normal of each patch corner.
+    ``warnings`` and ``counts`` for the report.
+    """
+
+    positions: Floats
+    topology: Topology
+    source_faces: Ints
+    source_corners: Ints
+    stand_in: Ints
+    inner_faces: Ints
+    curves: Floats
+    fields: Floats
+    side_field: Ints
+    normals: Floats
+    classes: list[PatchClass]
+    sampling: Callable[[int, int], Sampling]
+    mesh: PolygonMesh
+    warnings: list[str] = field(default_factory=list)
+    counts: dict[str, int] = field(default_factory=dict)
+
+
+class Scheme(Protocol):
+    """A way to make a surface from a polygon mesh. One module per scheme."""
+
+    name: str
+    summary: str
+    source: str
+    faces: str
+    continuity: str
+    normals: tuple[str, ...]
+
+    def prepare(self, mesh: PolygonMesh, options: Any) -> Patches:
+        """Control data of the whole mesh; raises CurvifyError where the mesh cannot be used."""
+
+
+def bernstein(coefficients: Floats, t: Floats) -> Floats:
+    """Bezier polynomials ``(...,d+1)`` at ``t``: a shared ``t (m,)`` gives ``(...,m)`` by one matrix product.
+
+    A ``t`` with more axes is broadcast against ``coefficients[...,0,None]``.
+    """
+    degree = coefficients.shape[-1] - 1
+    basis = bernstein_basis(degree, t)
+    if t.ndim == 1:
+        return coefficients @ basis
+    total = coefficients[..., 0, None] * basis[0]
+    for i in range(1, degree + 1):
+        total = total + coefficients[..., i, None] * basis[i]
+    return total
+
+
+def bernstein_basis(degree: int, t: Floats) -> Floats:
+    """The Bernstein polynomials ``(degree+1, ...)`` at ``t (...)``."""
+    binomial = [1]
+    for i in range(degree):
+        binomial.append(binomial[-1] * (degree - i) // (i + 1))
+    return np.stack([b * t**i * (1 - t) ** (degree - i) for i, b in enumerate(binomial)])
+
+
+def bernstein_derivative(coefficients: Floats) -> Floats:
+    """Bezier coefficients ``(...,d)`` of the derivative of Bezier polynomials ``(...,d+1)``."""
+    return (coefficients.shape[-1] - 1) * np.diff(coefficients, axis=-1)

@@ -1,0 +1,183 @@
+"""Cross tangents of Gregory patches: the side fields T_k(t), in four kinds.
+
+``linear`` and ``quadratic`` are the paper's (Leung, Wang, Zhang, equations (8)-(11)), with end corrections that
+keep T(0) and T(1) on the neighboring edges for every normal. ``smooth`` and ``precise`` are ours
+(docs/mathematics.md): a blend of the two end tangents, projected across the edge normal, with no square root.
+All are perpendicular to the edge's normal field, which both faces share: that is what makes the surface G1.
+Arrays run (component, face, side, abscissa).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from curvify.mesh import Bools, Floats
+from curvify.schemes.base import bernstein, bernstein_derivative
+from curvify.schemes.gregory_basis import side_speed
+
+#: Weight of the smooth step in the blend of ``smooth``.
+SMOOTH_STEP = 0.75
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """Dot product over the leading axis."""
+    return np.einsum("c...,c...->...", a, b)
+
+
+@dataclass(eq=False)
+class Sides:
+    """Side data of some faces: ``curves`` and ``fields (3,f,n,4)`` Bezier points along each side in the face's
+    direction; ``start``, ``end (3,f,n)`` the cross tangents that the neighboring edges ask for at its ends.
+    """
+
+    curves: Floats
+    fields: Floats
+    start: Floats
+    end: Floats
+
+
+def projection(fields: Floats, y: Floats) -> Floats:
+    """Coefficient q of n_c in y, (n_c.y)/(n_c.n_c), zero where n_c vanishes."""
+    square = dot(fields, fields)
+    return np.divide(dot(fields, y), square, out=np.zeros_like(square), where=square > 0)
+
+
+@dataclass(eq=False)
+class ProjectedBlend:
+    """T = f(t) (1 + K b(t)) Y, Y the part across n_c of h(t) T(0) + (1 - h(t)) T(1).
+
+    ``precise``: f = s_n, b = 4t(1-t), h = 1-t. ``smooth``: f = 1, b = 16 t^2 (1-t)^2, h a smoother step.
+    ``gains (f,n)`` is K.
+    """
+
+    sides: Sides
+    kind: str
+    gains: Floats
+
+    def _profile(self, t: Floats) -> tuple[Floats, ...]:
+        """f, f', b, b', h, h' at t."""
+        n = self.gains.shape[1]
+        if self.kind == "precise":
+            f, f_slope = side_speed(n, t)
+            return f, f_slope, 4 * t * (1 - t), 4 - 8 * t, 1 - t, -np.ones_like(t)
+        b = 4 * t * (1 - t)
+        lam = SMOOTH_STEP
+        h = (1 - t) * ((1 - lam) + lam * (1 - t) * (1 + 2 * t))
+        h_slope = -(1 - lam) - 6 * lam * t * (1 - t)
+        return np.ones_like(t), np.zeros_like(t), b**2, 2 * b * (4 - 8 * t), h, h_slope
+
+    def blend(self, t: Floats) -> Floats:
+        """Y at ``t``: ``(3,f,n,m)``."""
+        _, _, _, _, h, _ = self._profile(t)
+        normal = bernstein(self.sides.fields, t)
+        y = self.sides.start[..., None] * h + self.sides.end[..., None] * (1 - h)
+        y -= projection(normal, y) * normal
+        return y
+
+    def fields(self, t: Floats) -> Floats:
+        """T at ``t (m,)`` or ``(n,m)``: ``(3,f,n,m)``."""
+        f, _, b, _, _, _ = self._profile(t)
+        y = self.blend(t)
+        y *= f * (1 + self.gains[..., None] * b)
+        return y
+
+    def field_derivatives(self, t: Floats) -> tuple[Floats, Floats]:
+        """T and T' at ``t``."""
+        f, f_slope, b, b_slope, h, h_slope = self._profile(t)
+        normal = bernstein(self.sides.fields, t)
+        normal_slope = bernstein(bernstein_derivative(self.sides.fields), t)
+        start, end = self.sides.start[..., None], self.sides.end[..., None]
+        part, part_slope = project_with_slope(start * h + end * (1 - h), (start - end) * h_slope, normal, normal_slope)
+        gain = self.gains[..., None]
+        factor = f * (1 + gain * b)
+        slope = f_slope * (1 + gain * b) + f * gain * b_slope
+        return factor * part, slope * part + factor * part_slope
+
+
+def project_with_slope(y: Floats, y_slope: Floats, normal: Floats, normal_slope: Floats) -> tuple[Floats, Floats]:
+    """The part of y across the normal, and its derivative."""
+    q = projection(normal, y)
+    square = dot(normal, normal)
+    numerator = dot(normal_slope, y) + dot(normal, y_slope) - 2 * q * dot(normal, normal_slope)
+    q_slope = np.divide(numerator, square, out=np.zeros_like(square), where=square > 0)
+    return y - q * normal, y_slope - q_slope * normal - q * normal_slope
+
+
+@dataclass(eq=False)
+class PaperTangent:
+    """The paper's cross tangent: the polygon's chord across the side, turned to be perpendicular to n_c.
+
+    ``points (3,f,n)`` the polygon; ``guides (3,f,n,3)`` the Bezier points of n_int along each side;
+    ``spare`` serves the sides ``degenerate (f,n)`` where the chord or its direction vanishes.
+    """
+
+    sides: Sides
+    points: Floats
+    guides: Floats
+    spare: ProjectedBlend
+    degenerate: Bools
+    corrections: tuple[Floats, Floats]
+
+    @classmethod
+    def build(cls, sides: Sides, points: Floats, guides: Floats) -> PaperTangent:
+        """Find the degenerate sides and the corrections D0, D1 that restore the required ends."""
+        gains = np.zeros(points.shape[1:])
+        none = np.zeros(points.shape[1:], dtype=bool)
+        tangent = cls(sides, points, guides, ProjectedBlend(sides, "smooth", gains), none, (sides.start * 0,) * 2)
+        tangent.degenerate = tangent._vanishing()
+        ends = tangent.fields(np.array([0.0, 1.0]))
+        tangent.corrections = (sides.start - ends[..., 0], sides.end - ends[..., 1])
+        return tangent
+
+    def _chord(self, t: Floats) -> tuple[Floats, Floats]:
+        """x(t), from the curve to the line between the next corners, and its derivative."""
+        before, after = np.roll(self.points, 1, axis=2)[..., None], np.roll(self.points, -2, axis=2)[..., None]
+        curve = bernstein(self.sides.curves, t)
+        curve_slope = bernstein(bernstein_derivative(self.sides.curves), t)
+        return (1 - t) * before + t * after - curve, after - before - curve_slope
+
+    def _direction(self, t: Floats) -> tuple[Floats, ...]:
+        """x, x', t_c, t_c' (equation 10: (n_int x x) x n_c), n_c, n_c'."""
+        x, x_slope = self._chord(t)
+        guide, guide_slope = bernstein(self.guides, t), bernstein(bernstein_derivative(self.guides), t)
+        normal = bernstein(self.sides.fields, t)
+        normal_slope = bernstein(bernstein_derivative(self.sides.fields), t)
+        a, b = dot(guide, normal), dot(x, normal)
+        a_slope = dot(guide_slope, normal) + dot(guide, normal_slope)
+        b_slope = dot(x_slope, normal) + dot(x, normal_slope)
+        direction = x * a - guide * b
+        slope = x_slope * a + x * a_slope - guide_slope * b - guide * b_slope
+        return x, x_slope, direction, slope, normal, normal_slope
+
+    def _vanishing(self) -> Bools:
+        """Sides ``(f,n)`` where x or t_c vanishes at one of 17 abscissae, against their largest size."""
+        x, _, direction, _, _, _ = self._direction(np.linspace(0, 1, 17))
+        result = np.zeros(self.points.shape[1:], dtype=bool)
+        for vector in (x, direction):
+            size = dot(vector, vector)
+            result |= size.min(axis=-1) <= 1e-16 * size.max(axis=-1)
+        return result
+
+    def fields(self, t: Floats) -> Floats:
+        """T at ``t``: ``(3,f,n,m)``."""
+        return self.field_derivatives(t)[0]
+
+    def field_derivatives(self, t: Floats) -> tuple[Floats, Floats]:
+        """T and T' at ``t`` (equation 11 with the end corrections)."""
+        x, x_slope, direction, slope, normal, normal_slope = self._direction(t)
+        size, square = dot(direction, direction), dot(x, x)
+        safe = (size > 0) & (square > 0)
+        size, square = np.where(safe, size, 1.0), np.where(safe, square, 1.0)
+        ratio = np.sqrt(square / size)
+        ratio_slope = ratio * (dot(x, x_slope) / square - dot(direction, slope) / size)
+        first, last = (c[..., None] for c in self.corrections)
+        part, part_slope = project_with_slope((1 - t) * first + t * last, last - first, normal, normal_slope)
+        value = ratio * direction + part
+        value_slope = ratio * slope + ratio_slope * direction + part_slope
+        if self.degenerate.any():
+            spare, spare_slope = self.spare.field_derivatives(t)
+            value = np.where(self.degenerate[..., None], spare, value)
+            value_slope = np.where(self.degenerate[..., None], spare_slope, value_slope)
+        return value, value_slope

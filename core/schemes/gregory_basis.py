@@ -1,0 +1,236 @@
+"""Basis tables of n-sided Gregory patches, and of the corrections that make them precise.
+
+Source: Leung, Wang, Zhang, equations (1), (3), (4) (J. Gregory's corner interpolators), written as one linear
+combination per face; the polynomial correction and the center function are ours (docs/mathematics.md).
+Per side k of a face the control vectors are, in this order, the Bezier points p_k, Q0_k, Q1_k of its edge, the
+cross tangent and its derivative at the two ends T_k(0), T_k(1), T'_k(0), T'_k(1); then, for the corrected
+patch, T_k(1/2)/s(1/2) (n != 4) and one vector that moves the center.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from curvify.mesh import Floats, Ints
+from curvify.sampling import domain_corners
+from curvify.schemes.base import Basis, bernstein_basis
+from curvify.schemes.domain import Domain, apothem, domain_jets, jet_compose, jet_product
+
+#: Control vectors per side of the plain patch.
+PLAIN = 7
+
+
+def gregory_basis(sides: int, points: Floats, corrected: bool) -> Basis:
+    """Tables of the patch at ``points (S,2)``, with the polynomial correction and the center if ``corrected``."""
+    domain = domain_jets(sides, points)
+    blocks = _plain_columns(domain)
+    weights = _field_weights(domain)
+    if corrected:
+        if sides != 4:
+            p, tau0, tau1, middle = _correction(sides, points, domain)
+            blocks[0] += p - 3 * tau0 + 3 * np.roll(tau1, 1, axis=1)
+            blocks[1] += 3 * tau0
+            blocks[2] -= 3 * tau1
+            blocks.append(middle)
+        blocks.append(_center_bump(domain))
+    linear = np.concatenate(blocks, axis=1).transpose(0, 2, 1)
+    return Basis(
+        np.ascontiguousarray(linear), weights.transpose(0, 2, 1).copy(), domain.u.transpose(0, 2, 1).copy()
+    )
+
+
+def edge_normal_basis(sides: int, points: Floats) -> Basis:
+    """Tables of the paper's approximate normals (section 4.3): the unit edge normals blended like the curves.
+
+    Control vectors are the corner normals, side fields the unit edge normals. Only values are given.
+    """
+    domain = domain_jets(sides, points)
+    both = domain.w + np.roll(domain.w, -1, axis=1)
+    linear, weights, u = (jets.transpose(0, 2, 1).copy() for jets in (-domain.w, both, domain.u))
+    return Basis(linear, weights, u)
+
+
+def _field_weights(domain: Domain) -> Floats:
+    """Weight of T_k(u_k): w_k v_k + w_{k+1} u_{k+1}, as jets ``(3,n,S)``."""
+    return jet_product(domain.w, domain.v) + np.roll(jet_product(domain.w, domain.u), -1, axis=1)
+
+
+def _plain_columns(domain: Domain) -> list[Floats]:
+    """Columns of p, Q0, Q1, T(0), T(1), T'(0), T'(1): jets ``(3,n,S)`` each."""
+    u, v, w = domain.u, domain.v, domain.w
+    both = w + np.roll(w, -1, axis=1)
+    values = bernstein_basis(3, u[0])
+    lower = bernstein_basis(2, u[0])
+    padded = np.concatenate([np.zeros_like(lower[:1]), lower, np.zeros_like(lower[:1])])
+    slopes = 3 * (padded[:-1] - padded[1:])
+    curve = [jet_product(both, jet_compose(values[i], slopes[i], u)) for i in range(4)]
+    at_start = _twist(u, v)
+    at_end = _twist(v, u)
+    return [
+        curve[0] + np.roll(curve[3], 1, axis=1) - w,
+        curve[1],
+        curve[2],
+        -jet_product(w, v),
+        -np.roll(jet_product(w, u), -1, axis=1),
+        -jet_product(w, at_start),
+        np.roll(jet_product(w, at_end), -1, axis=1),
+    ]
+
+
+def _twist(u: Floats, v: Floats) -> Floats:
+    """Jet of u v^2 / (u + v), Gregory's twist term, which vanishes with its slopes at u = v = 0."""
+    total = u[0] + v[0]
+    safe = np.where(total > 0, total, 1.0)
+    result = np.empty_like(u)
+    result[0] = u[0] * v[0] ** 2 / safe
+    by_u = v[0] ** 3 / safe**2
+    by_v = (u[0] * v[0] ** 2 + 2 * u[0] ** 2 * v[0]) / safe**2
+    result[1:] = by_u * u[1:] + by_v * v[1:]
+    return result
+
+
+def _center_bump(domain: Domain) -> Floats:
+    """Jet ``(3,1,S)`` of the product of the squared distances over the apothem: 1 at the center."""
+    square = domain.distance[:, 0]
+    for k in range(1, domain.distance.shape[1]):
+        square = jet_product(square, domain.distance[:, k])
+    return jet_product(square, square)[:, None]
+
+
+# --- the polynomial correction -----------------------------------------------------------------------------
+
+
+def correction_degree(sides: int) -> int:
+    """Degree of the polynomials that the corrected patch of n sides reproduces: 0 for none (n = 4)."""
+    return {3: 3, 4: 0, 5: 4, 6: 4}.get(sides, 3)
+
+
+def side_speed(sides: int, t: Floats) -> tuple[Floats, Floats]:
+    """s_n(t) and its derivative: the speed of the patch across side k over that of a linear cross tangent."""
+    if sides == 4:
+        return np.ones_like(t), np.zeros_like(t)
+    a, b = (1 - t) ** 2, t**2
+    total, total_slope = a + b, 4 * t - 2
+    if sides == 3:
+        return total, total_slope
+    g = 2 * np.cos(2 * np.pi / sides)
+    p, q = 1 + g * t, 1 + g * (1 - t)
+    under = a / p + b / q
+    under_slope = (-2 * (1 - t) * p - g * a) / p**2 + (2 * t * q + g * b) / q**2
+    return total / under, (total_slope * under - total * under_slope) / under**2
+
+
+@lru_cache(maxsize=64)
+def _monomials(degree: int) -> Ints:
+    """Exponents ``(m,2)`` of the monomials up to a total degree."""
+    return np.array([(i, total - i) for total in range(degree + 1) for i in range(total, -1, -1)])
+
+
+def _power(x: Floats, exponent: Ints, order: int) -> Floats:
+    """Derivative of the given order of x**exponent: ``(m,...)`` for exponents ``(m,)``."""
+    exponent = exponent.reshape(-1, *([1] * x.ndim))
+    factor = np.ones(exponent.shape)
+    for i in range(order):
+        factor = factor * (exponent - i)
+    return factor * x ** np.maximum(exponent - order, 0)
+
+
+def _monomial_derivatives(degree: int, points: Floats) -> tuple[Floats, Floats, Floats]:
+    """Monomials at ``points (...,2)``: values ``(m,...)``, gradients ``(m,...,2)``, Hessians ``(m,...,2,2)``."""
+    i, j = _monomials(degree).T
+    x, y = points[..., 0], points[..., 1]
+    px, py = ([_power(z, e, order) for order in range(3)] for z, e in ((x, i), (y, j)))
+    value = px[0] * py[0]
+    gradient = np.stack([px[1] * py[0], px[0] * py[1]], axis=-1)
+    mixed = px[1] * py[1]
+    rows = [np.stack([px[2] * py[0], mixed], axis=-1), np.stack([mixed, px[0] * py[2]], axis=-1)]
+    return value, gradient, np.stack(rows, axis=-2)
+
+
+@lru_cache(maxsize=64)
+def correction_fit(sides: int) -> Floats:
+    """L ``(m,4n)``: the polynomial that fits positions and tangents at the corners and T in the side middles."""
+    degree = correction_degree(sides)
+    corners = domain_corners(sides)
+    after = np.roll(corners, -1, axis=0)
+    along = after - corners
+    across = ((np.roll(corners, 1, axis=0) - corners) + (np.roll(corners, -2, axis=0) - after)) / 2
+    value, gradient, _ = _monomial_derivatives(degree, corners)
+    _, gradient_after, _ = _monomial_derivatives(degree, after)
+    _, gradient_middle, _ = _monomial_derivatives(degree, (corners + after) / 2)
+    rows = np.concatenate(
+        [
+            value,
+            np.einsum("mki,ki->mk", gradient, along),
+            np.einsum("mki,ki->mk", gradient_after, along),
+            np.einsum("mki,ki->mk", gradient_middle, across),
+        ],
+        axis=1,
+    )
+    return np.linalg.pinv(rows.T, rcond=1e-9)
+
+
+def _correction(sides: int, points: Floats, domain: Domain) -> list[Floats]:
+    """Columns for p, tau0, tau1 and T(1/2)/s(1/2): jets ``(3,n,S)`` each, zero with their slopes on all sides."""
+    missing = _monomial_defects(sides, points, domain)
+    table = np.einsum("dms,mc->dcs", missing, correction_fit(sides))
+    return np.split(table, 4, axis=1)
+
+
+def _monomial_defects(sides: int, points: Floats, domain: Domain) -> Floats:
+    """Jets ``(3,m,S)`` of each monomial minus the plain patch through its own side data."""
+    degree = correction_degree(sides)
+    corners = domain_corners(sides)
+    value, gradient, _ = _monomial_derivatives(degree, points)
+    defect = np.concatenate([value[None], np.moveaxis(gradient, -1, 0)])
+    u, v, w = domain.u, domain.v, domain.w
+    both, weights = w + np.roll(w, -1, axis=1), _field_weights(domain)
+    for k in range(sides):
+        ahead = (k + 1) % sides
+        ends = corners[k], corners[ahead], corners[k - 1], corners[(k + 2) % sides]
+        curve, curve_slope, tangent, tangent_slope = _monomial_side(sides, degree, ends, u[0, k])
+        defect -= jet_product(both[:, None, k], jet_compose(curve, curve_slope, u[:, None, k]))
+        defect -= jet_product(weights[:, None, k], jet_compose(tangent, tangent_slope, u[:, None, k]))
+        limits = np.array([0.0, 1.0])
+        curve, _, tangent, slope = (x[:, :, None] for x in _monomial_side(sides, degree, ends, limits))
+        defect += w[:, None, k] * curve[:, 0]
+        defect += jet_product(w[:, k], v[:, k])[:, None] * tangent[:, 0]
+        defect += jet_product(w[:, ahead], u[:, ahead])[:, None] * tangent[:, 1]
+        defect += jet_product(w[:, k], _twist(u[:, k], v[:, k]))[:, None] * slope[:, 0]
+        defect -= jet_product(w[:, ahead], _twist(v[:, ahead], u[:, ahead]))[:, None] * slope[:, 1]
+    return defect
+
+
+def _monomial_side(
+    sides: int, degree: int, ends: tuple[Floats, ...], t: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Monomials along a side at ``t (S,)``: curve, its derivative, cross tangent, its derivative, ``(m,S)``."""
+    start, end, before, after = ends
+    along = end - start
+    place = start + t[:, None] * along
+    across = (1 - t)[:, None] * (before - start) + t[:, None] * (after - end)
+    turn = (after - end) - (before - start)
+    value, gradient, hessian = _monomial_derivatives(degree, place)
+    speed, speed_slope = side_speed(sides, t)
+    plain = np.einsum("msi,si->ms", gradient, across)
+    slope = np.einsum("msij,si,j->ms", hessian, across, along) + gradient @ turn
+    return value, gradient @ along, speed * plain, speed_slope * plain + speed * slope
+
+
+def center_row(sides: int, corrected: bool) -> Basis:
+    """The tables at the center of the domain."""
+    return gregory_basis(sides, np.zeros((1, 2)), corrected)
+
+
+__all__ = [
+    "PLAIN",
+    "apothem",
+    "center_row",
+    "correction_degree",
+    "correction_fit",
+    "edge_normal_basis",
+    "gregory_basis",
+    "side_speed",
+]

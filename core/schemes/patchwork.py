@@ -1,0 +1,299 @@
+"""Patches of a polygon mesh before their insides are filled: split faces, edge curves, shared normal fields.
+
+Faces are split where no patch can serve them: concave or keyhole outlines, too many sides, and corners or sides
+where the patch would fold (Leung, Wang, Zhang, section 2.3; the fold tests are ours, docs/mathematics.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from curvify.convex import Split, split_at_corners, split_polygons
+from curvify.edges import bending_normals, edge_curves, normal_fields, smooth_tangents
+from curvify.mesh import Bools, Floats, Ints
+from curvify.polygons import newell_normals
+from curvify.prepare import Coarse, count_of
+from curvify.sampling import Sampling
+from curvify.schemes.base import PatchClass, Patches, bernstein, bernstein_derivative
+from curvify.sectors import Features, end_normals, sides_of_edges
+from curvify.topology import Topology, link_half_edges
+
+#: A corner of a patch must open by at least the angle with this sine (3 degrees).
+LEAST_CORNER_SINE = float(np.sin(np.radians(3.0)))
+#: Rounds of making corners and of splitting folded faces.
+ROUNDS = 4
+#: Patches looked at together in the fold tests.
+WINDOW = 2048
+
+
+class Fields(Protocol):
+    """Anything with cross tangents."""
+
+    def fields(self, t: Floats) -> Floats:
+        """Cross tangents ``(3,f,n,m)`` at ``t (m,)``."""
+
+
+@dataclass(eq=False)
+class Patchwork:
+    """Pieces of faces with their curves and normals.
+
+    ``topology`` of the pieces; ``split`` where they come from, in terms of the cleaned loops; per edge
+    ``curves (E,4,3)``; ``fields (N,4,3)`` edge normals and ``side_field (C,)`` the one of each half-edge; ``normals
+    (C,3)`` of the corners; ``line_end (C,)`` whether the half-edge is a crease or boundary where it starts.
+    """
+
+    coarse: Coarse
+    features: Features
+    split: Split
+    topology: Topology
+    curves: Floats
+    fields: Floats
+    side_field: Ints
+    normals: Floats
+    warnings: list[str] = field(default_factory=list)
+    counts: dict[str, int] = field(default_factory=dict)
+
+    def corner_points(self, corners: Ints) -> Floats:
+        """Positions ``(3,f,n)`` of corners ``(f,n)``."""
+        return self.coarse.positions.T[:, self.topology.vertices[corners]]
+
+    def corner_normals(self, corners: Ints) -> Floats:
+        """Normals ``(3,f,n)`` of corners ``(f,n)``."""
+        return np.moveaxis(self.normals[corners], -1, 0)
+
+    def side_curves(self, corners: Ints) -> Floats:
+        """Bezier points ``(3,f,n,4)`` of the half-edges ``(f,n)``, each in its own direction."""
+        return self._in_direction(self.curves[self.topology.edge[corners]], corners)
+
+    def side_fields(self, corners: Ints) -> Floats:
+        """Bezier points ``(3,f,n,4)`` of the normal fields of the half-edges ``(f,n)``."""
+        return self._in_direction(self.fields[self.side_field[corners]], corners)
+
+    def _in_direction(self, points: Floats, corners: Ints) -> Floats:
+        backward = ~self.topology.forward[corners]
+        points[backward] = points[backward][:, ::-1]
+        return np.ascontiguousarray(np.moveaxis(points, -1, 0))
+
+    def size_classes(self) -> Iterator[tuple[int, Ints]]:
+        """Polygon sizes and the pieces ``(f,)`` of each."""
+        sizes = self.topology.sizes
+        for size in np.unique(sizes):
+            yield int(size), np.flatnonzero(sizes == size)
+
+    def patches(self, classes: list[PatchClass], sampling: Callable[[int, int], Sampling]) -> Patches:
+        """Everything a backend and the numbering need."""
+        loops = self.coarse.loops
+        return Patches(
+            positions=self.coarse.positions,
+            topology=self.topology,
+            source_faces=loops.source_faces[self.split.source_faces],
+            source_corners=loops.source_corners[self.split.source_corners],
+            stand_in=self.coarse.stand_in,
+            inner_faces=loops.source_faces[self.split.diagonal_faces],
+            curves=self.curves,
+            fields=self.fields,
+            side_field=self.side_field,
+            normals=self.normals,
+            classes=classes,
+            sampling=sampling,
+            mesh=self.coarse.mesh,
+            warnings=self.coarse.warnings + self.warnings,
+            counts=self.coarse.counts | self.counts,
+        )
+
+
+def build_patchwork(
+    coarse: Coarse, lengths: str, split_rule: str, tangents_of: Callable[[Patchwork, Ints], Fields]
+) -> Patchwork:
+    """Split faces until no patch folds that splitting can save, and build all curves.
+
+    ``lengths`` is the rule of ``edges.tangent_lengths``; ``tangents_of(work, corners)`` gives the scheme's cross
+    tangents of some patches. What still folds is counted and warned of.
+    """
+    loops = coarse.loops
+    split = split_polygons(coarse.positions, loops.offsets, loops.vertices, rule=split_rule)
+    corners = np.zeros(len(coarse.positions), dtype=bool)
+    work = _build(coarse, coarse.features(corners), split, lengths)
+    sines = _corner_sines(work)
+    for _ in range(ROUNDS - 1):
+        made = _new_corners(work, sines)
+        if not made.any():
+            break
+        corners |= made
+        work = _build(coarse, coarse.features(corners), split, lengths)
+        sines = _corner_sines(work)
+    for _ in range(ROUNDS):
+        bad, folded = _bad_corners(work, sines, tangents_of)
+        wide = work.topology.sizes[work.topology.faces] > 3
+        if not (bad & wide).any():
+            break
+        closer = split_at_corners(coarse.positions, split, bad & wide, work.normals)
+        if len(closer.face_offsets) == len(split.face_offsets):
+            break
+        split = closer
+        work = _build(coarse, work.features, split, lengths)
+        sines = _corner_sines(work)
+    else:
+        bad, folded = _bad_corners(work, sines, tangents_of)
+    _note_splits(work, folded)
+    return work
+
+
+def _build(coarse: Coarse, features: Features, split: Split, lengths: str) -> Patchwork:
+    """Curves and fields of all edges of the pieces."""
+    positions, base = coarse.positions, coarse.topology
+    topology = _piece_topology(coarse, split)
+    normals = features.normals[split.source_corners]
+    count = len(base.edges)
+    first, _ = sides_of_edges(topology)
+    ends = end_normals(topology, normals, first)
+    start, end = positions[topology.edges[:, 0]], positions[topology.edges[:, 1]]
+    tangents, bending = features.tangents, features.bending
+    if len(topology.edges) > count:
+        a, b = ends[count:, 0], ends[count:, 1]
+        chord = (end - start)[count:]
+        area = newell_normals(positions, split.face_offsets, split.face_vertices)[topology.faces[first[count:]]]
+        extra = bending_normals(chord, a, b, area)
+        across = np.stack([smooth_tangents(chord, n, extra) for n in (a, b)], axis=1)
+        tangents, bending = np.concatenate([tangents, across]), np.concatenate([bending, extra])
+    curves = edge_curves(start, end, tangents[:, 0], tangents[:, 1], lengths)
+    own = end_normals(topology, normals, np.arange(len(normals)))
+    differs = np.flatnonzero((own != ends[topology.edge]).any(axis=(1, 2)))
+    differs = differs[np.argsort(topology.edge[differs], kind="stable")]
+    index = topology.edge.copy()
+    index[differs] = len(topology.edges) + np.arange(len(differs))
+    edge = np.concatenate([np.arange(len(topology.edges)), topology.edge[differs]])
+    pair = np.concatenate([ends, own[differs]])
+    fields = normal_fields(curves[edge], pair[:, 0], pair[:, 1], bending[edge])
+    return Patchwork(coarse, features, split, topology, curves, fields, index, normals)
+
+
+def _piece_topology(coarse: Coarse, split: Split) -> Topology:
+    """Topology of the pieces: the mesh's edges keep their numbers, diagonals follow."""
+    base = coarse.topology
+    if len(split.face_vertices) == len(base.vertices) and not len(split.diagonal_faces):
+        return base
+    inner = split.diagonals >= 0
+    edge = np.where(inner, len(base.edges) + split.diagonals, base.edge[split.source_corners])
+    heads = np.empty_like(split.face_vertices)
+    heads[:-1] = split.face_vertices[1:]
+    heads[split.face_offsets[1:] - 1] = split.face_vertices[split.face_offsets[:-1]]
+    diagonals = np.empty((len(split.diagonal_faces), 2), dtype=np.int64)
+    diagonals[split.diagonals[inner]] = np.stack([split.face_vertices[inner], heads[inner]], axis=1)
+    edges = np.concatenate([base.edges, diagonals])
+    return link_half_edges(coarse.positions, split.face_offsets, split.face_vertices, edges, edge)
+
+
+def _corner_sines(work: Patchwork) -> Floats:
+    """Sine ``(C,)`` between the two curves at each corner, negative where the patch folds there."""
+    topology = work.topology
+    curves = work.curves[topology.edge]
+    forward = topology.forward[:, None]
+    point = work.coarse.positions[topology.vertices]
+    out = np.where(forward, curves[:, 1], curves[:, 2]) - point
+    arriving = np.where(forward, curves[:, 2], curves[:, 1])
+    back = arriving[topology.prev] - point
+    lengths = np.linalg.norm(out, axis=1) * np.linalg.norm(back, axis=1)
+    volume = np.einsum("ci,ci->c", np.cross(out, back), work.normals)
+    return np.divide(volume, lengths, out=np.zeros_like(volume), where=lengths > 0)
+
+
+def _line_ends(work: Patchwork) -> Bools:
+    """Half-edges ``(C,)`` that are a crease or a boundary where they start."""
+    topology, features = work.topology, work.features
+    sharp = np.zeros((len(topology.edges), 2), dtype=bool)
+    sharp[: len(features.sharp)] = features.sharp
+    sharp |= ~topology.interior[:, None]
+    return sharp[topology.edge, np.where(topology.forward, 0, 1)]
+
+
+def _arriving_line_ends(work: Patchwork) -> Bools:
+    """Corners ``(C,)`` whose previous half-edge is a crease or a boundary where it ends."""
+    topology, features = work.topology, work.features
+    sharp = np.zeros((len(topology.edges), 2), dtype=bool)
+    sharp[: len(features.sharp)] = features.sharp
+    sharp |= ~topology.interior[:, None]
+    before = topology.prev
+    return sharp[topology.edge[before], np.where(topology.forward[before], 1, 0)]
+
+
+def _new_corners(work: Patchwork, sines: Floats) -> Bools:
+    """Vertices ``(V,)`` to make corners: folded, on at least two creases or boundaries, normals computed."""
+    made = np.zeros(len(work.coarse.positions), dtype=bool)
+    if work.coarse.given is not None:
+        return made
+    base, features = work.coarse.topology, work.features
+    line = features.sharp | ~base.interior[:, None]
+    lines = np.bincount(base.edges[line], minlength=len(made))
+    made[work.topology.vertices[sines < -1e-9]] = True
+    return made & (lines >= 2) & ~features.corners
+
+
+def _bad_corners(
+    work: Patchwork, sines: Floats, tangents_of: Callable[[Patchwork, Ints], Fields]
+) -> tuple[Bools, Bools]:
+    """Corners ``(C,)`` from which their faces should be split, and the pieces ``(P,)`` that fold.
+
+    A corner is bad if it opens too little, unless two creases or boundaries pass straight through it by
+    construction; a side is bad if its cross tangent does not point inwards, and counts for its narrower corner.
+    """
+    straight = (np.abs(sines) < 1e-9) & _line_ends(work) & _arriving_line_ends(work)
+    bad = (sines <= LEAST_CORNER_SINE) & ~straight
+    folded = np.zeros(len(work.topology.offsets) - 1, dtype=bool)
+    folded[work.topology.faces[(sines < 0) & ~straight]] = True
+    for size, patches in work.size_classes():
+        for begin in range(0, len(patches), WINDOW):
+            rows = patches[begin : begin + WINDOW]
+            corners = work.topology.offsets[rows][:, None] + np.arange(size)
+            inward = _least_inward(work, corners, tangents_of(work, corners))
+            face, side = np.nonzero(inward <= 0)
+            if len(face):
+                folded[rows[face]] = True
+                one, other = corners[face, side], corners[face, (side + 1) % size]
+                bad[np.where(sines[one] <= sines[other], one, other)] = True
+    return bad, folded
+
+
+def _least_inward(work: Patchwork, corners: Ints, tangent: Fields) -> Floats:
+    """Smallest (C' x T).n_c ``(f,n)`` at 9 abscissae of each side."""
+    t = np.arange(1, 10) / 10
+    slope = bernstein(bernstein_derivative(work.side_curves(corners)), t)
+    normal = bernstein(work.side_fields(corners), t)
+    across = tangent.fields(t)
+    return np.einsum("cfnm,cfnm->fnm", np.cross(slope, across, axis=0), normal).min(axis=-1)
+
+
+def _note_splits(work: Patchwork, folded: Bools) -> None:
+    """Warnings and counts of what was split and of what still folds."""
+    split, loops = work.split, work.coarse.loops
+    texts = {
+        "concave": ("concave face", "split into convex pieces"),
+        "keyhole": ("face that visits a vertex twice", "split into simple pieces"),
+        "many_sided": ("face with more than 64 sides", "split"),
+        "folding": ("face that would fold", "split"),
+        "unsplit": ("face that no diagonal can make convex", "left as it is"),
+    }
+    for reason, (noun, outcome) in texts.items():
+        number = split.counts.get(reason, 0)
+        work.counts[f"{reason}_faces"] = number
+        if number:
+            first = loops.source_faces[split.first[reason]]
+            plural = noun.replace("face", "faces", 1).replace("visits", "visit")
+            work.warnings.append(f"{count_of(number, noun, plural)} {outcome}, first: {first}")
+    work.counts["folded_patches"] = int(folded.sum())
+    work.counts["adjusted_corners"] = work.features.adjusted
+    if folded.any():
+        first = loops.source_faces[split.source_faces[np.flatnonzero(folded)[0]]]
+        work.warnings.append(
+            f"{count_of(int(folded.sum()), 'patch', 'patches')} of the surface fold, first in face {first}; "
+            "the normals there turn too far for the polygon"
+        )
+    if work.features.adjusted:
+        work.warnings.append(
+            f"{count_of(work.features.adjusted, 'corner')} could not keep the normal of the vertex: "
+            "no curve along an edge fits all its faces"
+        )
