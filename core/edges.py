@@ -16,6 +16,8 @@ from curvify.normals import dot, unit
 LEAST_ADVANCE = 0.05
 #: End normals whose parts across the edge have a cosine below this turn against each other.
 OPPOSITE = -0.99
+#: A normal whose part across the edge is below this lies along it.
+ALONG = 1e-3
 
 
 def bending_normals(chord: Floats, start_normal: Floats, end_normal: Floats, face_normal: Floats) -> Floats:
@@ -53,7 +55,7 @@ def smooth_tangents(chord: Floats, normal: Floats, bending: Floats) -> Floats:
     along = unit(chord)
     tangent = unit(along * dot(normal, bending) - bending * dot(normal, along))
     projected = along - dot(along, normal) * normal
-    flat = np.linalg.norm(projected, axis=-1, keepdims=True) < 1e-3
+    flat = np.linalg.norm(projected, axis=-1, keepdims=True) < ALONG
     fallback = np.where(flat, along, unit(projected))
     return np.where(dot(tangent, along) <= LEAST_ADVANCE, fallback, tangent)
 
@@ -77,16 +79,17 @@ def edge_curves(start: Floats, end: Floats, start_tangent: Floats, end_tangent: 
 def normal_fields(curves: Floats, start_normal: Floats, end_normal: Floats, bending: Floats) -> Floats:
     """Bezier points ``(E,4,3)`` of the normal field C' x (N x e), equation (7); not of unit length.
 
-    ``curves (E,4,3)``, end normals and bending normals ``(E,3)``. Where the end normals turn against each
-    other across the edge the field would vanish inside it: the bending normal takes the place of both.
+    ``curves (E,4,3)``, end normals and bending normals ``(E,3)``. The field would vanish where an end normal lies
+    along the edge, and inside it where the end normals turn against each other: there the bending normal takes
+    their place.
     """
     chord = curves[:, 3] - curves[:, 0]
     along = unit(chord)
-    a = unit(start_normal - dot(start_normal, along) * along)
-    b = unit(end_normal - dot(end_normal, along) * along)
-    opposite = dot(a, b) < OPPOSITE
-    m0 = np.where(opposite, bending, start_normal)
-    m1 = np.where(opposite, bending, end_normal)
+    a = start_normal - dot(start_normal, along) * along
+    b = end_normal - dot(end_normal, along) * along
+    replace = (dot(unit(a), unit(b)) < OPPOSITE) | (np.minimum(dot(a, a), dot(b, b)) < ALONG**2)
+    m0 = np.where(replace, bending, start_normal)
+    m1 = np.where(replace, bending, end_normal)
     c0, c1, c2 = (3 * (curves[:, i + 1] - curves[:, i]) for i in range(3))
 
     def field(derivative: Floats, normal: Floats) -> Floats:

@@ -289,7 +289,7 @@ def _note_splits(work: Patchwork, folded: Bools) -> None:
     if folded.any():
         first = loops.source_faces[split.source_faces[np.flatnonzero(folded)[0]]]
         work.warnings.append(
-            f"{count_of(int(folded.sum()), 'patch', 'patches')} of the surface fold, first in face {first}; "
+            f"{count_of(int(folded.sum()), 'patch', 'patches')} of the surface {'folds' if folded.sum() == 1 else 'fold'}, first in face {first}; "
             "the normals there turn too far for the polygon"
         )
     if work.features.adjusted:
