@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from curvify.arrays import values_of
 from curvify.dissect import Cut, Group, cut_group, edge_keys, is_in
 from curvify.errors import OptionError
 from curvify.mesh import Bools, Floats, Ints
@@ -55,9 +56,11 @@ class Split:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many source faces were split because they are ``concave``, ``keyhole``, ``many_sided`` or
-        ``folding``; are left ``unsplit`` because no diagonal helps; or got a diagonal along an existing
-        edge, for want of any other (``doubled``).
+        """How many source faces each reason holds for.
+
+        ``concave``, ``keyhole``, ``many_sided`` and ``folding`` faces were split; ``unsplit`` ones were left as
+        they are because no diagonal helps; ``doubled`` ones got a diagonal along an existing edge, for want
+        of any other.
         """
         return {name: int(np.count_nonzero(self.reasons & flag)) for name, flag in REASONS.items()}
 
@@ -106,7 +109,7 @@ def _faces_to_split(positions: Floats, offsets: Ints, vertices: Ints, max_sides:
     sizes = np.diff(offsets)
     rows = np.ascontiguousarray(positions.T)
     groups = []
-    for size in np.unique(sizes[sizes > 3]):
+    for size in values_of(sizes[sizes > 3]):
         of_size = np.flatnonzero(sizes == size)
         for faces in np.array_split(of_size, -(-len(of_size) * size // 30_000)):
             corners = offsets[faces] + np.arange(size)[:, None]
@@ -251,7 +254,7 @@ def _folding_diagonals(
     sizes = np.diff(split.face_offsets)[pieces]
     nothing: Ints = np.zeros(0, dtype=np.int64)
     found: list[tuple[Ints, Ints, Floats]] = [(nothing, nothing, np.zeros(0))]
-    for size in np.unique(sizes[sizes > 3]):
+    for size in values_of(sizes[sizes > 3]):
         corners = split.face_offsets[pieces[sizes == size]] + np.arange(size)[:, None]
         turned = _first_corners(rows[:, split.face_vertices[corners]]) + np.arange(size)[:, None]
         corners = np.take_along_axis(corners, turned % size, axis=0)

@@ -9,12 +9,15 @@ padded: the same bytes for any number of threads.
 
 from __future__ import annotations
 
+import math
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
+from curvify.arrays import values_of
 from curvify.mesh import Floats, Ints
 from curvify.normals import unit
 from curvify.sampling import Sampling
@@ -138,6 +141,19 @@ def _make_tables(basis: Basis, first: int, last: int, count: int, orders: int) -
 # --- patches ------------------------------------------------------------------------------------------------
 
 
+_LOCAL = threading.local()
+
+
+def _work(name: str, shape: tuple[int, ...]) -> Floats:
+    """An array of this thread's own to work in, kept from chunk to chunk: fresh memory is slow to touch."""
+    size = math.prod(shape)
+    found: Floats | None = getattr(_LOCAL, name, None)
+    if found is None or found.size < size:
+        found = np.empty(size)
+        setattr(_LOCAL, name, found)
+    return found[:size].reshape(shape)
+
+
 def chunk_size(samples: int) -> int:
     """Patches evaluated at once: 10 to 20 thousand samples, which fit the cache with their work arrays."""
     return 16 * int(np.clip(round(1000 / max(samples, 1)), 1, 16))
@@ -155,7 +171,8 @@ def choose_counts(controls: Controls, sides: int, tolerance: float) -> tuple[Int
         return counts, values
     for count in NODE_COUNTS:
         values[count] = controls.fields(chebyshev_points(count))
-        size = np.abs(values[count] @ _tail_matrix(count)).max(axis=(0, 2, 3))
+        size = np.abs(values[count].reshape(-1, count) @ _tail_matrix(count))
+        size = size.reshape(3, patches, -1).max(axis=(0, 2))
         counts[(counts == 0) & (size <= tolerance)] = count
         if counts.all():
             break
@@ -205,16 +222,15 @@ def _store(out: Floats, place: tuple[Ints, slice], values: Floats) -> None:
 
 def _cross_normals(a: Floats, b: Floats) -> tuple[Floats, tuple[Ints, Ints] | None]:
     """Unit cross products ``(3,f,S)`` of vectors ``(3,f,S)``, and where they are parallel, if anywhere."""
-    normal = np.empty(a.shape)
-    work = np.empty(a.shape[1:])
+    normal, work = _work("normal", a.shape), _work("product of two", a.shape[1:])
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         np.multiply(a[j], b[k], out=normal[i])
         np.multiply(a[k], b[j], out=work)
         normal[i] -= work
-    square = np.einsum("cfs,cfs->fs", normal, normal)
+    square = np.einsum("cfs,cfs->fs", normal, normal, out=work)
     parallel: tuple[Ints, Ints] | None = None
-    if square.min() <= PARALLEL * square.max():
+    if not square.min() > PARALLEL * square.max():  # also where anything is not a number
         speeds = np.einsum("cfs,cfs->fs", a, a) * np.einsum("cfs,cfs->fs", b, b)
         found = square <= PARALLEL * speeds
         if found.any():
@@ -240,13 +256,13 @@ def _evaluate_form(
     sides = grid[0]
     counts, nodes = choose_counts(controls, sides, tolerance)
     size = chunk_size(min(len(points), SAMPLES))
-    for count in np.unique(counts):
+    for count in values_of(counts):
         group = np.flatnonzero(counts == count)
-        for block in tables(form, points, grid, int(count), orders):
+        for block in tables(form, points, grid, count, orders):
             for begin in range(0, len(group), size):
                 part = group[begin : begin + size]
                 if count:
-                    values = _chunk(controls.linear, nodes[int(count)], part, size, block, orders)
+                    values = _chunk(controls.linear, nodes[count], part, size, block, orders)
                 else:
                     values = exact_values(form.controls(rows[part]), block.basis, orders)
                 yield (part, slice(block.first, block.last)), values
@@ -256,11 +272,12 @@ def _chunk(linear: Floats, nodes: Floats, part: Ints, size: int, block: Tables, 
     """One matrix product for a chunk, padded to its fixed size by its last patch."""
     padded = np.concatenate([part, np.repeat(part[-1:], size - len(part))])
     columns = linear.shape[2]
-    vectors = np.empty((3, size, len(block.matrix)))
+    samples = block.last - block.first
+    vectors = _work("vectors", (3, size, len(block.matrix)))
     vectors[..., :columns] = linear[:, padded]
     vectors[..., columns:] = nodes[:, padded].reshape(3, size, -1)
-    product = vectors.reshape(3 * size, -1) @ block.matrix
-    samples = block.last - block.first
+    product = _work("product", (3 * size, orders * samples))
+    np.matmul(vectors.reshape(3 * size, -1), block.matrix, out=product)
     return product.reshape(3, size, orders, samples)[:, : len(part)].transpose(2, 0, 1, 3)
 
 
@@ -288,7 +305,7 @@ def evaluate_at(patches: Patches, ids: Ints, points: Floats) -> tuple[Floats, Fl
     """
     result = np.empty((3, len(ids), 3))
     for patch_class in patches.classes:
-        mine = np.flatnonzero(np.isin(ids, patch_class.patches))
+        mine = np.flatnonzero(patches.topology.sizes[ids] == patch_class.sides)
         for begin in range(0, len(mine), SAMPLES):
             part = mine[begin : begin + SAMPLES]
             rows = np.searchsorted(patch_class.patches, ids[part])
@@ -311,7 +328,7 @@ def blended_normals(patches: Patches, ids: Ints, points: Floats) -> Floats:
     """Corner normals of patches blended over their domains ``(m,3)``: for where derivatives are parallel."""
     result = np.empty((len(ids), 3))
     for patch_class in patches.classes:
-        mine = np.flatnonzero(np.isin(ids, patch_class.patches))
+        mine = np.flatnonzero(patches.topology.sizes[ids] == patch_class.sides)
         if len(mine):
             corners = patches.topology.offsets[ids[mine]][:, None] + np.arange(patch_class.sides)
             weights = domain_jets(patch_class.sides, points[mine]).w[0]
@@ -326,13 +343,21 @@ def edge_points(curves: Floats, t: Floats) -> Floats:
     """Points ``(e,m,3)`` of Bezier curves ``(e,d+1,3)`` at ``t (m,)``, in plain elementwise arithmetic: an edge
     gets the same bits wherever it stands.
     """
+    return np.moveaxis(_edge_rows(curves, t), 0, -1)
+
+
+def _edge_rows(curves: Floats, t: Floats) -> Floats:
+    """Points ``(3,e,m)``: the component leads, so that the inner loop is long."""
+    rows = np.ascontiguousarray(np.moveaxis(curves, -1, 0))
     basis = bernstein_basis(curves.shape[1] - 1, t)
-    total = curves[:, None, 0] * basis[0][:, None]
+    total = rows[..., 0, None] * basis[0]
+    term = np.empty_like(total)
     for i in range(1, len(basis)):
-        total += curves[:, None, i] * basis[i][:, None]
+        np.multiply(rows[..., i, None], basis[i], out=term)
+        total += term
     return total
 
 
 def edge_normals(fields: Floats, t: Floats) -> Floats:
     """Unit normals ``(e,m,3)`` of Bezier normal fields ``(e,q+1,3)`` at ``t (m,)``."""
-    return unit(edge_points(fields, t))
+    return np.moveaxis(_unit_rows(_edge_rows(fields, t)), 0, -1)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from curvify.arrays import cross
 from curvify.mesh import Bools, Floats, Ints
 
 REFLEX = 1e-3  # a corner whose sine is above minus this counts as convex
@@ -50,7 +51,7 @@ def corner_crosses(positions: Floats, face_offsets: Ints, face_vertices: Ints) -
     """
     points = positions[face_vertices]
     sides = points[next_corners(face_offsets)] - points
-    return np.cross(sides[previous_corners(face_offsets)], sides)
+    return cross(sides[previous_corners(face_offsets)], sides)
 
 
 def newell_normals(positions: Floats, face_offsets: Ints, face_vertices: Ints) -> Floats:
@@ -58,7 +59,7 @@ def newell_normals(positions: Floats, face_offsets: Ints, face_vertices: Ints) -
     points = positions[face_vertices]
     firsts = points[np.repeat(face_offsets[:-1], np.diff(face_offsets))]
     points = points - firsts
-    return sum_over_faces(np.cross(points, points[next_corners(face_offsets)]), face_offsets)
+    return sum_over_faces(cross(points, points[next_corners(face_offsets)]), face_offsets)
 
 
 def sum_over_faces(values: Floats, face_offsets: Ints) -> Floats:
@@ -96,6 +97,8 @@ def judge(points: Floats, counts: Ints | None = None, up: bool = False) -> Verdi
     the loop is a piece of, and the loop must face the same way.
     """
     size, loops = points.shape[1:]
+    if counts is not None and counts.min(initial=size) == size:
+        counts = None
     after, before = np.roll(points, -1, axis=1), np.roll(points, 1, axis=1)
     if counts is not None:
         every = np.arange(loops)
@@ -135,12 +138,20 @@ def judge(points: Floats, counts: Ints | None = None, up: bool = False) -> Verdi
 
 def cross_rows(a: Floats, b: Floats) -> Floats:
     """Cross product of vectors whose coordinates come first, ``(3,...)``."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    result = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        np.multiply(a[i], b[j], out=result[k])
+        result[k] -= a[j] * b[i]
+    return result
 
 
 def dot_rows(a: Floats, b: Floats) -> Floats:
     """Dot product of vectors whose coordinates come first, ``(3,...)``."""
-    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+    total = np.asarray(a[0] * b[0])
+    total += a[1] * b[1]
+    total += a[2] * b[2]
+    return total
 
 
 def lay_flat(points: Floats) -> Floats:

@@ -106,7 +106,7 @@ def _note_topology(coarse: Coarse, welded: int) -> None:
     counts, warnings = coarse.counts, coarse.warnings
     used = np.zeros(mesh.vertex_count, dtype=bool)
     used[mesh.face_vertices] = True
-    fan_vertices = topology.vertices[np.unique(_fans(topology))]
+    fan_vertices = topology.vertices[np.flatnonzero(np.bincount(_fans(topology)))]
     counts.update(
         vertices=mesh.vertex_count,
         faces=mesh.face_count,
@@ -119,7 +119,7 @@ def _note_topology(coarse: Coarse, welded: int) -> None:
         vertices_with_several_fans=int((np.bincount(fan_vertices, minlength=mesh.vertex_count) > 1).sum()),
     )
     if counts["dropped_faces"]:
-        gone = np.setdiff1d(np.arange(mesh.face_count), loops.source_faces)[0]
+        gone = np.flatnonzero(np.bincount(loops.source_faces, minlength=mesh.face_count) == 0)[0]
         warnings.append(
             f"{count_of(counts['dropped_faces'], 'face')} with fewer than 3 distinct corners dropped, first: {gone}"
         )

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from curvify import evaluate
+from curvify.arrays import cross, values_of
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import degrees_between
 from curvify.polygons import newell_normals
@@ -58,13 +59,13 @@ def _side_samples(patches: Patches, half_edges: Ints, t: Floats) -> tuple[Floats
     sides = topology.sizes[ids]
     side = half_edges - topology.offsets[ids]
     points = np.empty((len(half_edges), len(t), 2))
-    for size in np.unique(sides):
+    for size in values_of(sides):
         rows = np.flatnonzero(sides == size)
-        corners = domain_corners(int(size))
+        corners = domain_corners(size)
         start, end = corners[side[rows]], corners[(side[rows] + 1) % size]
         points[rows] = start[:, None] * (1 - t)[:, None] + end[:, None] * t[:, None]
     position, by_xi, by_eta = evaluate.evaluate_at(patches, np.repeat(ids, len(t)), points.reshape(-1, 2))
-    return position, np.cross(by_xi, by_eta)
+    return position, cross(by_xi, by_eta)
 
 
 def volume_ratio(patches: Patches, positions: Floats, faces: Ints) -> float | None:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from curvify import evaluate
+from curvify.arrays import cross
 from curvify.errors import LimitError, OptionError
 from curvify.jobs import dense_jobs, dense_layout
 from curvify.mesh import DenseMesh, Floats, Ints, PolygonMesh
@@ -61,7 +62,7 @@ class Surface:
             raise OptionError(f"patches are numbered 0 to {len(self.sides) - 1}")
         _check_inside(self.sides[ids], places)
         position, by_xi, by_eta = evaluate.evaluate_at(self.patches, ids, places)
-        normal = np.cross(by_xi, by_eta)
+        normal = cross(by_xi, by_eta)
         square = (normal**2).sum(axis=1)
         speeds = (by_xi**2).sum(axis=1) * (by_eta**2).sum(axis=1)
         parallel = square <= 1e-20 * speeds

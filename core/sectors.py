@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from curvify.arrays import cross
 from curvify.edges import LEAST_ADVANCE, bending_normals, smooth_tangents
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import SAME_NORMAL, degrees_between, dot, sector_normals, sum_by, unit
@@ -173,7 +174,7 @@ def end_normals(topology: Topology, normals: Floats, half_edges: Ints) -> Floats
 def _crease_tangents(along: Floats, left: Floats, right: Floats, mean: Floats, line: Floats) -> Floats:
     """Tangent ``(k,3)`` where two normals meet: their common perpendicular, towards the line or the edge."""
     guide = np.where(line.any(axis=1, keepdims=True), line, along)
-    across = unit(np.cross(left, right))
+    across = unit(cross(left, right))
     tangent = across * np.where(dot(across, guide) < 0, -1.0, 1.0)
     projected = unit(along - dot(along, mean) * mean)
     return np.where(dot(tangent, along) < LEAST_ADVANCE, projected, tangent)
@@ -197,11 +198,11 @@ def _fit_normals(
     refit = own | (tilt > 1e-6)
     if not refit.any():
         return normals, 0
-    cross = np.cross(out[refit], back[refit])
+    upright = cross(out[refit], back[refit])
     old = normals[refit]
     flattened = unit(old - dot(old, out[refit]) * out[refit])
-    collinear = np.linalg.norm(cross, axis=1, keepdims=True) < 1e-6
-    fitted = unit(cross) * np.where(dot(cross, old) < 0, -1.0, 1.0)
+    collinear = np.linalg.norm(upright, axis=1, keepdims=True) < 1e-6
+    fitted = unit(upright) * np.where(dot(upright, old) < 0, -1.0, 1.0)
     fitted = np.where(collinear, flattened, fitted)
     normals = normals.copy()
     normals[refit] = fitted

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from curvify.arrays import cross, distinct
 from curvify.mesh import Bools, Floats, Ints
 from curvify.polygons import next_corners, previous_corners
 
@@ -127,11 +128,11 @@ def _stitches(positions: Floats, tails: Ints, heads: Ints) -> list[Ints]:
     """Vertex pairs to merge so that open half-edges become twins: two arrays ``(2,k)``, one per end."""
     count = len(positions)
     key = np.minimum(tails, heads) * count + np.maximum(tails, heads)
-    _, inverse, uses = np.unique(key, return_inverse=True, return_counts=True)
-    open_ = np.flatnonzero((uses == 1)[inverse])
+    inverse = distinct(key)[1]
+    open_ = np.flatnonzero(np.bincount(inverse)[inverse] == 1)
     if not len(open_):
         return []
-    ends, place = np.unique(np.concatenate([tails[open_], heads[open_]]), return_inverse=True)
+    ends, place = distinct(np.concatenate([tails[open_], heads[open_]]))
     tail, head = position_classes(positions[ends])[place].reshape(2, -1)
     apart = tail != head
     open_, tail, head = open_[apart], tail[apart], head[apart]
@@ -171,7 +172,7 @@ def build_topology(positions: Floats, offsets: Ints, vertices: Ints) -> Topology
     count = len(positions)
     heads = vertices[next_corners(offsets)]
     key = np.minimum(vertices, heads) * count + np.maximum(vertices, heads)
-    keys, edge = np.unique(key, return_inverse=True)
+    keys, edge = distinct(key)
     edges = np.stack([keys // count, keys % count], axis=1)
     return link_half_edges(positions, offsets, vertices, edges, edge)
 
@@ -214,5 +215,5 @@ def signed_volume(positions: Floats, offsets: Ints, vertices: Ints) -> float:
     faces = np.repeat(np.arange(len(sizes)), np.diff(offsets))
     points = positions[vertices] - positions.mean(axis=0)
     centers = np.stack([np.bincount(faces, points[:, i], len(sizes)) for i in range(3)], axis=1) / sizes[:, None]
-    triple = np.einsum("ci,ci->c", centers[faces], np.cross(points, points[following]))
+    triple = np.einsum("ci,ci->c", centers[faces], cross(points, points[following]))
     return float(triple.sum() / 6)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from curvify.arrays import values_of
 from curvify.mesh import Bools, Floats, Ints
 from curvify.sampling import Sampling, edge_abscissae, segments
 from curvify.schemes.base import Patches
@@ -221,9 +222,9 @@ def _cells_by_size(
     """For each polygon size: the patches (counted from ``first``) and their cells ``(f,Q,s)``."""
     offsets = patches.topology.offsets
     wide = numbering.vertex_count + numbering.repeat_count >= 2**31
-    for size in np.unique(sizes):
+    for size in values_of(sizes):
         rows = np.flatnonzero(sizes == size)
-        sampling = numbering.samplings[int(size)]
+        sampling = numbering.samplings[size]
         corners = offsets[first + rows][:, None] + np.arange(size)
         step = np.arange(numbering.inner)
         runs = numbering.run_starts[corners][..., None] + numbering.run_strides[corners][..., None] * step

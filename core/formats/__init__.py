@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import os
 import sys
+from importlib import import_module
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from curvify.errors import FormatError
 from curvify.formats.files import atomic_file, read_bytes
-from curvify.formats.obj import read_obj, write_obj
-from curvify.formats.obj_write import FloatType
-from curvify.formats.off import read_off, write_off
-from curvify.formats.others import READABLE, WRITABLE, read_other, write_other
-from curvify.formats.ply import read_ply, write_ply
 from curvify.mesh import PolygonMesh
+
+if TYPE_CHECKING:
+    from curvify.formats.obj_write import FloatType
 
 __all__ = [
     "READ_FORMATS",
@@ -26,8 +25,16 @@ __all__ = [
 ]
 
 _OWN = ("obj", "ply", "off")
-READ_FORMATS = (*_OWN, *READABLE)
-WRITE_FORMATS = (*_OWN, *WRITABLE)
+#: What trimesh reads and writes for us.
+_READABLE = ("stl", "glb", "gltf", "3mf", "dae")
+_WRITABLE = ("stl", "glb", "dae", "3mf")
+READ_FORMATS = (*_OWN, *_READABLE)
+WRITE_FORMATS = (*_OWN, *_WRITABLE)
+
+
+def _module(format: str) -> Any:
+    """The module of a format, imported when it is first needed: a run uses one or two of them."""
+    return import_module(f"curvify.formats.{format if format in _OWN else 'others'}")
 
 
 def find_format(path: str | os.PathLike[str], format: str | None, known: tuple[str, ...]) -> str:
@@ -64,13 +71,11 @@ def read_mesh(
         except OSError as error:
             raise FormatError(f"stdin: cannot read: {error.strerror}") from None
         chosen = find_format("-", format or _sniff(data), READ_FORMATS)
-    if chosen == "obj":
-        return read_obj(data, name)
-    if chosen == "ply":
-        return read_ply(data, name)
-    if chosen == "off":
-        return read_off(data, name)
-    return read_other(data, name, chosen)
+    module = _module(chosen)
+    mesh: PolygonMesh = (
+        getattr(module, f"read_{chosen}")(data, name) if chosen in _OWN else module.read_other(data, name, chosen)
+    )
+    return mesh
 
 
 def _sniff(data: bytes) -> str | None:
@@ -99,19 +104,21 @@ def write_mesh(
     chosen = find_format(path, format, WRITE_FORMATS)
     if os.fspath(path) == "-":
         out = stdout or sys.stdout.buffer
-        _write(mesh, out, chosen, ascii, dtype)
+        write_stream(mesh, out, chosen, ascii, dtype)
         out.flush()
         return
     with atomic_file(path) as out:
-        _write(mesh, out, chosen, ascii, dtype)
+        write_stream(mesh, out, chosen, ascii, dtype)
 
 
-def _write(mesh: PolygonMesh, out: BinaryIO, format: str, ascii: bool, dtype: FloatType | None) -> None:
-    if format == "obj":
-        write_obj(mesh, out, dtype)
-    elif format == "ply":
-        write_ply(mesh, out, ascii, dtype)
-    elif format == "off":
-        write_off(mesh, out, dtype)
+def write_stream(
+    mesh: PolygonMesh, out: BinaryIO, format: str, ascii: bool = False, dtype: FloatType | None = None
+) -> None:
+    """Write a mesh to an open file; see ``write_mesh``."""
+    module = _module(format)
+    if format == "ply":
+        module.write_ply(mesh, out, ascii, dtype)
+    elif format in _OWN:
+        getattr(module, f"write_{format}")(mesh, out, dtype)
     else:
-        write_other(mesh, out, format)
+        module.write_other(mesh, out, format)

@@ -15,14 +15,14 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from curvify.errors import FormatError
-from curvify.formats import WRITE_FORMATS, atomic_file, find_format
+from curvify.formats import WRITE_FORMATS, atomic_file, find_format, write_stream
 from curvify.formats.obj_write import clean_name, float_colors
-from curvify.formats.off import write_off
-from curvify.formats.others import write_other
 from curvify.formats.text import face_lines, join_columns, vector_lines
 from curvify.mesh import DenseMesh, Ints, PolygonMesh
 from curvify.sinks import ArraySink, DenseLayout, Sink
 
+#: Coordinates from which the surface might leave the range of float32.
+LARGE = 1e36
 _PLY_NAMES = {
     "position": ("x", "y", "z"),
     "normal": ("nx", "ny", "nz"),
@@ -42,6 +42,7 @@ class PlySink:
     def begin(self, layout: DenseLayout) -> None:
         """Write the header."""
         self.vertex_type = layout.vertex_type
+        self.huge = float(np.abs(layout.mesh.positions).max(initial=0.0)) > LARGE
         self.sides = 3 if self.triangulate else layout.cell_size
         self.per_cell = layout.cell_size - 2 if self.triangulate else 1
         index = "<i4" if layout.wedge_count < 2**31 else "<u4"
@@ -70,7 +71,8 @@ class PlySink:
 
     def vertices(self, start: int, records: np.ndarray[Any, Any]) -> None:
         """Write a block of wedges."""
-        check_range(records)
+        if self.huge:
+            check_range(records)
         self._put(records, self.origin + start * self.vertex_type.itemsize if self.anywhere else 0)
 
     def faces(self, start: int, wedges: Ints, source_faces: Ints) -> None:
@@ -280,10 +282,7 @@ def _sink(out: BinaryIO, format: str, ascii: bool, triangulate: bool, streamed: 
         collected = ArraySink()
         yield collected
         mesh = to_polygon_mesh(collected.dense_mesh(), triangulate)
-        if format == "off":
-            write_off(mesh, out)
-        else:
-            write_other(mesh, out, format)
+        write_stream(mesh, out, format)
 
 
 def to_polygon_mesh(dense: DenseMesh, triangulate: bool = False) -> PolygonMesh:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import re
-import secrets
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -104,7 +103,7 @@ def _open_beside(name: str) -> tuple[BinaryIO, Path, Path]:
     if not name or name.endswith("/"):
         raise IsADirectoryError(errno.EISDIR, "is a directory", name)
     target = Path(os.path.realpath(name))
-    temporary = target.parent / f".curvify-{secrets.token_hex(6)}.part"
+    temporary = target.parent / f".curvify-{os.urandom(6).hex()}.part"
     descriptor = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     with suppress(OSError):
         temporary.chmod(stat.S_IMODE(target.stat().st_mode))

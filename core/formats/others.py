@@ -15,9 +15,6 @@ from curvify.formats.obj_write import round_to
 from curvify.formats.wedges import split_vertices, wedge_rows
 from curvify.mesh import Floats, Ints, PolygonMesh
 
-READABLE = ("stl", "glb", "gltf", "3mf", "dae")
-WRITABLE = ("stl", "glb", "dae", "3mf")
-
 
 @dataclass
 class _Part:
@@ -39,7 +36,7 @@ def _import_trimesh() -> Any:
 
 
 def read_other(data: bytes, name: str, format: str) -> PolygonMesh:
-    """Parse a file of one of the ``READABLE`` formats into a triangle mesh.
+    """Parse a file of a format that it reads into a triangle mesh.
 
     All parts of a scene are put together, transformed. Vertices stay as the file has them, not merged.
     Normals, uvs and vertex colors are kept where every part has them.
@@ -145,7 +142,7 @@ def _stored_uvs(part: Any) -> Floats | None:
 
 
 def write_other(mesh: PolygonMesh, out: BinaryIO, format: str) -> None:
-    """Write ``mesh`` in one of the ``WRITABLE`` formats, polygons cut into triangles.
+    """Write ``mesh`` in a format that trimesh writes, polygons cut into triangles.
 
     Positions are rounded to float32, as most of these formats store them. Normals, uvs and colors go
     along where the format has them. Raises FormatError where trimesh cannot write.

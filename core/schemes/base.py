@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
+from math import comb
 from typing import Any, Protocol
 
 import numpy as np
@@ -123,24 +124,31 @@ def bernstein(coefficients: Floats, t: Floats) -> Floats:
 
     A ``t`` with more axes is broadcast against ``coefficients[...,0,None]``.
     """
-    degree = coefficients.shape[-1] - 1
-    basis = bernstein_basis(degree, t)
-    if t.ndim == 1:
-        return coefficients @ basis
+    return _combine(coefficients, bernstein_basis(coefficients.shape[-1] - 1, t))
+
+
+def bernstein_slope(coefficients: Floats, t: Floats) -> Floats:
+    """Derivatives of Bezier polynomials ``(...,d+1)`` at ``t``, as in ``bernstein``."""
+    return _combine(coefficients, bernstein_slopes(coefficients.shape[-1] - 1, t))
+
+
+def _combine(coefficients: Floats, basis: Floats) -> Floats:
+    if basis.ndim == 2:
+        rows = coefficients.reshape(-1, len(basis)) @ basis
+        return rows.reshape(*coefficients.shape[:-1], -1)
     total = coefficients[..., 0, None] * basis[0]
-    for i in range(1, degree + 1):
-        total = total + coefficients[..., i, None] * basis[i]
+    for i in range(1, len(basis)):
+        total += coefficients[..., i, None] * basis[i]
     return total
 
 
 def bernstein_basis(degree: int, t: Floats) -> Floats:
     """The Bernstein polynomials ``(degree+1, ...)`` at ``t (...)``."""
-    binomial = [1]
-    for i in range(degree):
-        binomial.append(binomial[-1] * (degree - i) // (i + 1))
-    return np.stack([b * t**i * (1 - t) ** (degree - i) for i, b in enumerate(binomial)])
+    return np.stack([comb(degree, i) * t**i * (1 - t) ** (degree - i) for i in range(degree + 1)])
 
 
-def bernstein_derivative(coefficients: Floats) -> Floats:
-    """Bezier coefficients ``(...,d)`` of the derivative of Bezier polynomials ``(...,d+1)``."""
-    return (coefficients.shape[-1] - 1) * np.diff(coefficients, axis=-1)
+def bernstein_slopes(degree: int, t: Floats) -> Floats:
+    """Derivatives of the Bernstein polynomials ``(degree+1, ...)`` at ``t (...)``."""
+    lower = bernstein_basis(degree - 1, t)
+    none = np.zeros_like(lower[:1])
+    return degree * (np.concatenate([none, lower]) - np.concatenate([lower, none]))

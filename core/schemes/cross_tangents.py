@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from curvify.mesh import Bools, Floats
-from curvify.schemes.base import bernstein, bernstein_derivative
+from curvify.schemes.base import bernstein, bernstein_slope
 from curvify.schemes.gregory_basis import side_speed
 
 #: Weight of the smooth step in the blend of ``smooth``.
@@ -56,44 +56,52 @@ class ProjectedBlend:
     kind: str
     gains: Floats
 
-    def _profile(self, t: Floats) -> tuple[Floats, ...]:
-        """f, f', b, b', h, h' at t."""
-        n = self.gains.shape[1]
-        if self.kind == "precise":
-            f, f_slope = side_speed(n, t)
-            return f, f_slope, 4 * t * (1 - t), 4 - 8 * t, 1 - t, -np.ones_like(t)
-        b = 4 * t * (1 - t)
-        lam = SMOOTH_STEP
-        h = (1 - t) * ((1 - lam) + lam * (1 - t) * (1 + 2 * t))
-        h_slope = -(1 - lam) - 6 * lam * t * (1 - t)
-        return np.ones_like(t), np.zeros_like(t), b**2, 2 * b * (4 - 8 * t), h, h_slope
-
     def blend(self, t: Floats) -> Floats:
         """Y at ``t``: ``(3,f,n,m)``."""
-        _, _, _, _, h, _ = self._profile(t)
+        h, _ = self._step(t)
         normal = bernstein(self.sides.fields, t)
-        y = self.sides.start[..., None] * h + self.sides.end[..., None] * (1 - h)
+        y = self.sides.start[..., None] * h
+        y += self.sides.end[..., None] * (1 - h)
         y -= projection(normal, y) * normal
         return y
 
+    def blend_with_slope(self, t: Floats) -> tuple[Floats, Floats]:
+        """Y and Y' at ``t``."""
+        h, h_slope = self._step(t)
+        start, end = self.sides.start[..., None], self.sides.end[..., None]
+        normal, normal_slope = bernstein(self.sides.fields, t), bernstein_slope(self.sides.fields, t)
+        return project_with_slope(start * h + end * (1 - h), (start - end) * h_slope, normal, normal_slope)
+
     def fields(self, t: Floats) -> Floats:
         """T at ``t (m,)`` or ``(n,m)``: ``(3,f,n,m)``."""
-        f, _, b, _, _, _ = self._profile(t)
         y = self.blend(t)
-        y *= f * (1 + self.gains[..., None] * b)
+        y *= self._factor(t)[0]
         return y
 
     def field_derivatives(self, t: Floats) -> tuple[Floats, Floats]:
         """T and T' at ``t``."""
-        f, f_slope, b, b_slope, h, h_slope = self._profile(t)
-        normal = bernstein(self.sides.fields, t)
-        normal_slope = bernstein(bernstein_derivative(self.sides.fields), t)
-        start, end = self.sides.start[..., None], self.sides.end[..., None]
-        part, part_slope = project_with_slope(start * h + end * (1 - h), (start - end) * h_slope, normal, normal_slope)
+        return self.scaled(t, *self.blend_with_slope(t))
+
+    def scaled(self, t: Floats, y: Floats, y_slope: Floats) -> tuple[Floats, Floats]:
+        """T and T' at ``t`` from Y and Y' there."""
+        factor, slope = self._factor(t)
+        return factor * y, slope * y + factor * y_slope
+
+    def _step(self, t: Floats) -> tuple[Floats, Floats]:
+        """The share h of the start, and h'."""
+        if self.kind == "precise":
+            return 1 - t, -np.ones_like(t)
+        lam = SMOOTH_STEP
+        return (1 - t) * ((1 - lam) + lam * (1 - t) * (1 + 2 * t)), -(1 - lam) - 6 * lam * t * (1 - t)
+
+    def _factor(self, t: Floats) -> tuple[Floats, Floats]:
+        """F (1 + K b) and its derivative."""
+        b, b_slope = 4 * t * (1 - t), 4 - 8 * t
         gain = self.gains[..., None]
-        factor = f * (1 + gain * b)
-        slope = f_slope * (1 + gain * b) + f * gain * b_slope
-        return factor * part, slope * part + factor * part_slope
+        if self.kind == "precise":
+            f, f_slope = side_speed(self.gains.shape[1], t)
+            return f * (1 + gain * b), f_slope * (1 + gain * b) + f * gain * b_slope
+        return 1 + gain * b**2, gain * 2 * b * b_slope
 
 
 def project_with_slope(y: Floats, y_slope: Floats, normal: Floats, normal_slope: Floats) -> tuple[Floats, Floats]:
@@ -135,15 +143,15 @@ class PaperTangent:
         """x(t), from the curve to the line between the next corners, and its derivative."""
         before, after = np.roll(self.points, 1, axis=2)[..., None], np.roll(self.points, -2, axis=2)[..., None]
         curve = bernstein(self.sides.curves, t)
-        curve_slope = bernstein(bernstein_derivative(self.sides.curves), t)
+        curve_slope = bernstein_slope(self.sides.curves, t)
         return (1 - t) * before + t * after - curve, after - before - curve_slope
 
     def _direction(self, t: Floats) -> tuple[Floats, ...]:
         """x, x', t_c, t_c' (equation 10: (n_int x x) x n_c), n_c, n_c'."""
         x, x_slope = self._chord(t)
-        guide, guide_slope = bernstein(self.guides, t), bernstein(bernstein_derivative(self.guides), t)
+        guide, guide_slope = bernstein(self.guides, t), bernstein_slope(self.guides, t)
         normal = bernstein(self.sides.fields, t)
-        normal_slope = bernstein(bernstein_derivative(self.sides.fields), t)
+        normal_slope = bernstein_slope(self.sides.fields, t)
         a, b = dot(guide, normal), dot(x, normal)
         a_slope = dot(guide_slope, normal) + dot(guide, normal_slope)
         b_slope = dot(x_slope, normal) + dot(x, normal_slope)

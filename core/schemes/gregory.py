@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 
+from curvify.arrays import cross
 from curvify.errors import OptionError
 from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.prepare import prepare_mesh
@@ -122,18 +123,19 @@ class GregoryControls:
         """Controls of the patches with the given corners ``(f,n)``."""
         n = corners.shape[1]
         points, tangent, target = cross_tangents(work, corners, options)
-        value, slope = tangent.field_derivatives(np.array([0.0, 1.0]))
+        value, slope = tangent.field_derivatives(np.array([0.0, 0.5, 1.0]))
         curves = tangent.sides.curves
-        parts = [points, curves[..., 1], curves[..., 2], value[..., 0], value[..., 1], slope[..., 0], slope[..., 1]]
-        if target is None:
-            return cls(np.concatenate(parts, axis=2), tangent)
-        middle = tangent.fields(np.array([0.5]))[..., 0]
-        if n != 4:
-            parts.append(middle / side_speed(n, np.array([0.5]))[0])
-        linear = np.concatenate([*parts, np.zeros((3, len(corners), 1))], axis=2)
-        basis = center_row(n, True)
-        center = linear @ basis.linear[0, 0] + middle @ basis.weights[0, 0]
-        linear[..., -1] = target - center
+        corrected = target is not None
+        blocks = [points, curves[..., 1], curves[..., 2], value[..., 0], value[..., 2], slope[..., 0], slope[..., 2]]
+        if corrected and n != 4:
+            blocks.append(value[..., 1] / side_speed(n, np.array([0.5]))[0])
+        linear = np.zeros((3, len(corners), n * len(blocks) + corrected))
+        for i, block in enumerate(blocks):
+            linear[..., n * i : n * (i + 1)] = block
+        if target is not None:
+            basis = center_row(n, True)
+            center = linear @ basis.linear[0, 0] + value[..., 1] @ basis.weights[0, 0]
+            linear[..., -1] = target - center
         return cls(linear, tangent)
 
 
@@ -196,7 +198,7 @@ def paper_tangent(sides: Sides, points: Floats, normals: Floats, options: Option
 def polygon_normal(points: Floats) -> Floats:
     """Unit mean ``(3,f)`` of the unit corner crosses of polygons ``(3,f,n)``: equation (12)."""
     ahead, behind = np.roll(points, -1, axis=2) - points, np.roll(points, 1, axis=2) - points
-    return _unit(_unit(np.cross(ahead, behind, axis=0)).sum(axis=2))
+    return _unit(_unit(cross(ahead, behind, axis=0)).sum(axis=2))
 
 
 def center_point(points: Floats, normals: Floats) -> Floats:
@@ -204,7 +206,7 @@ def center_point(points: Floats, normals: Floats) -> Floats:
     middle = points.mean(axis=2)
     offsets = middle[..., None] - points
     ahead = np.roll(offsets, -1, axis=2)
-    area = _unit(np.cross(offsets, ahead, axis=0).sum(axis=2))
+    area = _unit(cross(offsets, ahead, axis=0).sum(axis=2))
     total = normals.sum(axis=2)
     weak = np.sqrt(dot(total, total)) < 0.2 * points.shape[2]
     mean = np.where(weak, area, _unit(total))

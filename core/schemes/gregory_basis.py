@@ -15,8 +15,8 @@ import numpy as np
 
 from curvify.mesh import Floats, Ints
 from curvify.sampling import domain_corners
-from curvify.schemes.base import Basis, bernstein_basis
-from curvify.schemes.domain import Domain, apothem, domain_jets, jet_compose, jet_product
+from curvify.schemes.base import Basis, bernstein_basis, bernstein_slopes
+from curvify.schemes.domain import Domain, domain_jets, jet_compose, jet_product
 
 #: Control vectors per side of the plain patch.
 PLAIN = 7
@@ -62,9 +62,7 @@ def _plain_columns(domain: Domain) -> list[Floats]:
     u, v, w = domain.u, domain.v, domain.w
     both = w + np.roll(w, -1, axis=1)
     values = bernstein_basis(3, u[0])
-    lower = bernstein_basis(2, u[0])
-    padded = np.concatenate([np.zeros_like(lower[:1]), lower, np.zeros_like(lower[:1])])
-    slopes = 3 * (padded[:-1] - padded[1:])
+    slopes = bernstein_slopes(3, u[0])
     curve = [jet_product(both, jet_compose(values[i], slopes[i], u)) for i in range(4)]
     at_start = _twist(u, v)
     at_end = _twist(v, u)
@@ -219,18 +217,7 @@ def _monomial_side(
     return value, gradient @ along, speed * plain, speed_slope * plain + speed * slope
 
 
+@lru_cache(maxsize=64)
 def center_row(sides: int, corrected: bool) -> Basis:
     """The tables at the center of the domain."""
     return gregory_basis(sides, np.zeros((1, 2)), corrected)
-
-
-__all__ = [
-    "PLAIN",
-    "apothem",
-    "center_row",
-    "correction_degree",
-    "correction_fit",
-    "edge_normal_basis",
-    "gregory_basis",
-    "side_speed",
-]

@@ -12,13 +12,14 @@ from typing import Protocol
 
 import numpy as np
 
+from curvify.arrays import cross, values_of
 from curvify.convex import Split, split_at_corners, split_polygons
 from curvify.edges import bending_normals, edge_curves, normal_fields, smooth_tangents
 from curvify.mesh import Bools, Floats, Ints
 from curvify.polygons import newell_normals
 from curvify.prepare import Coarse, count_of
 from curvify.sampling import Sampling
-from curvify.schemes.base import PatchClass, Patches, bernstein, bernstein_derivative
+from curvify.schemes.base import PatchClass, Patches, bernstein, bernstein_slope
 from curvify.sectors import Features, end_normals, sides_of_edges
 from curvify.topology import Topology, link_half_edges
 
@@ -81,8 +82,8 @@ class Patchwork:
     def size_classes(self) -> Iterator[tuple[int, Ints]]:
         """Polygon sizes and the pieces ``(f,)`` of each."""
         sizes = self.topology.sizes
-        for size in np.unique(sizes):
-            yield int(size), np.flatnonzero(sizes == size)
+        for size in values_of(sizes):
+            yield size, np.flatnonzero(sizes == size)
 
     def patches(self, classes: list[PatchClass], sampling: Callable[[int, int], Sampling]) -> Patches:
         """Everything a backend and the numbering need."""
@@ -198,7 +199,7 @@ def _corner_sines(work: Patchwork) -> Floats:
     arriving = np.where(forward, curves[:, 2], curves[:, 1])
     back = arriving[topology.prev] - point
     lengths = np.linalg.norm(out, axis=1) * np.linalg.norm(back, axis=1)
-    volume = np.einsum("ci,ci->c", np.cross(out, back), work.normals)
+    volume = np.einsum("ci,ci->c", cross(out, back), work.normals)
     return np.divide(volume, lengths, out=np.zeros_like(volume), where=lengths > 0)
 
 
@@ -261,10 +262,10 @@ def _bad_corners(
 def _least_inward(work: Patchwork, corners: Ints, tangent: Fields) -> Floats:
     """Smallest (C' x T).n_c ``(f,n)`` at 9 abscissae of each side."""
     t = np.arange(1, 10) / 10
-    slope = bernstein(bernstein_derivative(work.side_curves(corners)), t)
+    slope = bernstein_slope(work.side_curves(corners), t)
     normal = bernstein(work.side_fields(corners), t)
     across = tangent.fields(t)
-    return np.einsum("cfnm,cfnm->fnm", np.cross(slope, across, axis=0), normal).min(axis=-1)
+    return np.einsum("cfnm,cfnm->fnm", cross(slope, across, axis=0), normal).min(axis=-1)
 
 
 def _note_splits(work: Patchwork, folded: Bools) -> None:
@@ -288,8 +289,9 @@ def _note_splits(work: Patchwork, folded: Bools) -> None:
     work.counts["adjusted_corners"] = work.features.adjusted
     if folded.any():
         first = loops.source_faces[split.source_faces[np.flatnonzero(folded)[0]]]
+        number = int(folded.sum())
         work.warnings.append(
-            f"{count_of(int(folded.sum()), 'patch', 'patches')} of the surface {'folds' if folded.sum() == 1 else 'fold'}, first in face {first}; "
+            f"{count_of(number, 'patch folds', 'patches fold')}, first in face {first}: "
             "the normals there turn too far for the polygon"
         )
     if work.features.adjusted:
