@@ -17,23 +17,26 @@ from functools import lru_cache
 
 import numpy as np
 
-from curvify.arrays import values_of
-from curvify.mesh import Floats, Ints
+from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import unit
 from curvify.sampling import Sampling
 from curvify.schemes.base import Basis, Controls, Form, PatchClass, Patches, bernstein_basis
 from curvify.schemes.domain import domain_jets
 
 #: Numbers of Chebyshev points tried, fewest first.
-NODE_COUNTS = (16, 24, 32, 48)
-#: Chebyshev coefficients at the end of the series that must be small.
-TAIL = 4
+NODE_COUNTS = (8, 12, 16, 24, 32, 48)
+#: Chebyshev coefficients at the end of the series from which the rest is estimated, and how much to make of that.
+TAIL, SAFETY = 4, 10.0
+#: Coefficients below this share of the longest vector are rounding noise.
+NOISE = 2e-15
 #: Samples of a patch evaluated with one table, so that the table stays in cache.
 SAMPLES = 2048
 #: From this many sides the fields are evaluated at every sample: the tables would be too large.
 MANY_SIDES = 17
 #: Squared sine below which two derivatives count as parallel.
 PARALLEL = 1e-24
+#: Up to this many samples a patch the fields are evaluated at every sample: that is less than at the points.
+FEW_SAMPLES = 9
 #: Tables larger than this many numbers are built when needed and not kept.
 KEPT_TABLE = 1 << 20
 
@@ -133,6 +136,8 @@ def _make_tables(basis: Basis, first: int, last: int, count: int, orders: int) -
         fields = np.empty((orders, samples, sides, count))
         fields[0] = weights[0] * values
         fields[1:] = weights[1:] * values + weights[0] * u[1:] * slopes
+        fields[..., 0] += basis.ends[:orders, ..., 0]
+        fields[..., -1] += basis.ends[:orders, ..., 1]
         table[columns:] = fields.reshape(orders, samples, -1).transpose(2, 0, 1)
     matrix = np.ascontiguousarray(table.reshape(len(table), -1))
     return Tables(first, last, count, matrix, basis)
@@ -159,24 +164,21 @@ def chunk_size(samples: int) -> int:
     return 16 * int(np.clip(round(1000 / max(samples, 1)), 1, 16))
 
 
-def choose_counts(controls: Controls, sides: int, tolerance: float) -> tuple[Ints, dict[int, Floats]]:
-    """Chebyshev points each patch needs ``(f,)``, 0 where none suffice, and the field values tried, by count.
+def enough_points(fields: Floats, tolerance: float) -> Bools:
+    """Which patches ``(f,)`` have ``fields (3,f,n,m)`` at enough Chebyshev points.
 
-    Accepts a count when the last coefficients of every field are below ``tolerance``.
+    The coefficients of an analytic function fall like a geometric series: the last four give its rate, which gives
+    the sum of those left out. Enough when that is below ``tolerance`` times the longest of a patch's vectors, or
+    when the last four are rounding noise.
     """
-    patches = controls.linear.shape[1]
-    counts = np.zeros(patches, dtype=np.int64)
-    values: dict[int, Floats] = {}
-    if sides >= MANY_SIDES:
-        return counts, values
-    for count in NODE_COUNTS:
-        values[count] = controls.fields(chebyshev_points(count))
-        size = np.abs(values[count].reshape(-1, count) @ _tail_matrix(count))
-        size = size.reshape(3, patches, -1).max(axis=(0, 2))
-        counts[(counts == 0) & (size <= tolerance)] = count
-        if counts.all():
-            break
-    return counts, values
+    patches, count = fields.shape[1], fields.shape[3]
+    last = np.abs(fields.reshape(-1, count) @ _tail_matrix(count)).reshape(3, patches, -1, TAIL).max(axis=0)
+    earlier, later = np.maximum(last[..., 0], last[..., 1]), np.maximum(last[..., 2], last[..., 3])
+    rate = np.sqrt(np.divide(later, earlier, out=np.ones_like(later), where=earlier > later))
+    left_out = SAFETY * later * rate / np.maximum(1 - rate, 1 / SAFETY)
+    size = np.abs(fields).reshape(3, patches, -1).max(axis=(0, 2))
+    noise = np.maximum(earlier, later).max(axis=1) <= NOISE * size
+    return noise | (left_out.max(axis=1) <= tolerance * size)
 
 
 def fill_patches(
@@ -252,20 +254,38 @@ def _evaluate_form(
     form: Form, rows: Ints, points: Floats, grid: tuple[int, int], tolerance: float, orders: int
 ) -> Iterator[tuple[tuple[Ints, slice], Floats]]:
     """Values ``(o,3,f,S)`` of a form, with the index of the patches and samples they belong to."""
-    controls = form.controls(rows)
-    sides = grid[0]
-    counts, nodes = choose_counts(controls, sides, tolerance)
+    left = np.arange(len(rows))
+    exact = grid[0] >= MANY_SIDES or len(points) <= FEW_SAMPLES
+    for count in () if exact else NODE_COUNTS:
+        controls = form.controls(rows[left])
+        nodes = controls.fields(chebyshev_points(count))
+        enough = enough_points(nodes, tolerance)
+        part = np.flatnonzero(enough)
+        for place, values in _by_tables(form, controls.linear, nodes, part, points, (grid, count, orders)):
+            yield (left[place[0]], place[1]), values
+        left = left[~enough]
+        if not len(left):
+            return
     size = chunk_size(min(len(points), SAMPLES))
-    for count in values_of(counts):
-        group = np.flatnonzero(counts == count)
-        for block in tables(form, points, grid, count, orders):
-            for begin in range(0, len(group), size):
-                part = group[begin : begin + size]
-                if count:
-                    values = _chunk(controls.linear, nodes[count], part, size, block, orders)
-                else:
-                    values = exact_values(form.controls(rows[part]), block.basis, orders)
-                yield (part, slice(block.first, block.last)), values
+    for begin in range(0, len(left), size):
+        part = left[begin : begin + size]
+        for block in tables(form, points, grid, 0, orders):
+            values = exact_values(form.controls(rows[part]), block.basis, orders)
+            yield (part, slice(block.first, block.last)), values
+
+
+def _by_tables(
+    form: Form, linear: Floats, nodes: Floats, part: Ints, points: Floats, key: tuple[tuple[int, int], int, int]
+) -> Iterator[tuple[tuple[Ints, slice], Floats]]:
+    """Values of the patches ``part`` among those with the given controls, chunk by chunk."""
+    grid, count, orders = key
+    if not len(part):
+        return
+    size = chunk_size(min(len(points), SAMPLES))
+    for block in tables(form, points, grid, count, orders):
+        for begin in range(0, len(part), size):
+            chunk = part[begin : begin + size]
+            yield (chunk, slice(block.first, block.last)), _chunk(linear, nodes, chunk, size, block, orders)
 
 
 def _chunk(linear: Floats, nodes: Floats, part: Ints, size: int, block: Tables, orders: int) -> Floats:
@@ -286,16 +306,17 @@ def exact_values(controls: Controls, basis: Basis, orders: int = 3) -> Floats:
     linear = np.moveaxis(basis.linear[:orders], 0, -1)
     total = np.moveaxis(np.einsum("cfl,slo->cfso", controls.linear, linear, optimize=True), -1, 0)
     if basis.weights.shape[2]:
-        t = np.ascontiguousarray(basis.abscissae[0].T)
+        sides = basis.weights.shape[2]
+        t = np.concatenate([basis.abscissae[0].T, np.broadcast_to([0.0, 1.0], (sides, 2))], axis=1)
         weights, u = basis.weights.transpose(0, 2, 1), basis.abscissae.transpose(0, 2, 1)
-        if orders == 1:
-            total[0] += np.einsum("cfks,ks->cfs", controls.fields(t), weights[0])
-            return total
-        values, slopes = controls.field_derivatives(t)
-        total[0] += np.einsum("cfks,ks->cfs", values, weights[0])
-        for order in (1, 2):
-            total[order] += np.einsum("cfks,ks->cfs", values, weights[order])
-            total[order] += np.einsum("cfks,ks->cfs", slopes, weights[0] * u[order])
+        values = controls.fields(t) if orders == 1 else None
+        if values is None:
+            values, slopes = controls.field_derivatives(t)
+            for order in (1, 2):
+                total[order] += np.einsum("cfks,ks->cfs", slopes[..., :-2], weights[0] * u[order])
+        for order in range(orders):
+            total[order] += np.einsum("cfks,ks->cfs", values[..., :-2], weights[order])
+            total[order] += np.einsum("cfke,ske->cfs", values[..., -2:], basis.ends[order])
     return total
 
 
@@ -313,13 +334,14 @@ def evaluate_at(patches: Patches, ids: Ints, points: Floats) -> tuple[Floats, Fl
             controls = patch_class.surface.controls(rows)
             total = np.einsum("cql,oql->oqc", controls.linear, basis.linear)
             if basis.weights.shape[2]:
-                values, slopes = (
-                    f[..., 0] for f in controls.field_derivatives(basis.abscissae[0][:, :, None])
-                )
-                total += np.einsum("cqk,oqk->oqc", values, basis.weights)
+                t = np.empty((*basis.abscissae.shape[1:], 3))
+                t[..., 0], t[..., 1], t[..., 2] = basis.abscissae[0], 0.0, 1.0
+                values, slopes = controls.field_derivatives(t)
+                total += np.einsum("cqk,oqk->oqc", values[..., 0], basis.weights)
+                total += np.einsum("cqke,oqke->oqc", values[..., 1:], basis.ends)
                 for order in (1, 2):
                     chain = basis.weights[0] * basis.abscissae[order]
-                    total[order] += np.einsum("cqk,qk->qc", slopes, chain)
+                    total[order] += np.einsum("cqk,qk->qc", slopes[..., 0], chain)
             result[:, part] = total
     return result[0], result[1], result[2]
 
@@ -340,24 +362,18 @@ def blended_normals(patches: Patches, ids: Ints, points: Floats) -> Floats:
 
 
 def edge_points(curves: Floats, t: Floats) -> Floats:
-    """Points ``(e,m,3)`` of Bezier curves ``(e,d+1,3)`` at ``t (m,)``, in plain elementwise arithmetic: an edge
-    gets the same bits wherever it stands.
+    """Points ``(3,e,m)`` of Bezier curves ``(3,e,d+1)`` at ``t (m,)``, in plain elementwise arithmetic: an edge gets
+    the same bits wherever it stands.
     """
-    return np.moveaxis(_edge_rows(curves, t), 0, -1)
-
-
-def _edge_rows(curves: Floats, t: Floats) -> Floats:
-    """Points ``(3,e,m)``: the component leads, so that the inner loop is long."""
-    rows = np.ascontiguousarray(np.moveaxis(curves, -1, 0))
-    basis = bernstein_basis(curves.shape[1] - 1, t)
-    total = rows[..., 0, None] * basis[0]
+    basis = bernstein_basis(curves.shape[2] - 1, t)
+    total = curves[..., 0, None] * basis[0]
     term = np.empty_like(total)
     for i in range(1, len(basis)):
-        np.multiply(rows[..., i, None], basis[i], out=term)
+        np.multiply(curves[..., i, None], basis[i], out=term)
         total += term
     return total
 
 
 def edge_normals(fields: Floats, t: Floats) -> Floats:
-    """Unit normals ``(e,m,3)`` of Bezier normal fields ``(e,q+1,3)`` at ``t (m,)``."""
-    return np.moveaxis(_unit_rows(_edge_rows(fields, t)), 0, -1)
+    """Unit normals ``(3,e,m)`` of Bezier normal fields ``(3,e,q+1)`` at ``t (m,)``."""
+    return _unit_rows(edge_points(fields, t))

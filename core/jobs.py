@@ -22,9 +22,11 @@ from curvify.threads import Job
 from curvify.weld import Numbering, cells_of, repeat_vertices
 
 #: Samples in one job.
-WINDOW = 1 << 16
-#: Error allowed in the series of the cross tangents, over the diagonal of the bounding box, by output type.
-SERIES_TOLERANCE = {"float32": 3e-9, "float64": 1e-14}
+WINDOW = 1 << 17
+#: Samples that a patch counts for at least.
+PATCH = 64
+#: What may be left out of the series of a cross tangent, over its length, by output type.
+SERIES_TOLERANCE = {"float32": 1e-9, "float64": 1e-14}
 
 
 def dense_layout(patches: Patches, numbering: Numbering, dtype: np.dtype[Any]) -> DenseLayout:
@@ -80,8 +82,7 @@ class _Evaluation:
 
     def __init__(self, patches: Patches, numbering: Numbering, layout: DenseLayout) -> None:
         self.patches, self.numbering, self.layout = patches, numbering, layout
-        diagonal = float(np.linalg.norm(np.ptp(patches.positions, axis=0)))
-        self.tolerance = SERIES_TOLERANCE[layout.vertex_type["position"].base.name] * diagonal
+        self.tolerance = SERIES_TOLERANCE[layout.vertex_type["position"].base.name]
         self.colors = patches.mesh.vertex_colors
         self.first_half_edges = sides_of_edges(patches.topology)[0]
         outer = len(patches.topology.edges) - len(patches.inner_faces)
@@ -89,11 +90,15 @@ class _Evaluation:
         self.outer = outer
 
     def windows(self) -> Iterator[tuple[int, int]]:
-        """Patches first to last of each job: about WINDOW samples, whole input faces."""
+        """Patches first to last of each job: about WINDOW samples, whole input faces.
+
+        A patch counts for at least PATCH samples: its control vectors take room of their own.
+        """
         starts = self.numbering.patch_starts
         faces = self.patches.source_faces
         fresh = np.concatenate([[True], faces[1:] != faces[:-1]])
-        group = (starts - starts[0]) // WINDOW
+        sizes = np.diff(starts, append=self.numbering.vertex_count)
+        group = (np.cumsum(np.maximum(sizes, PATCH)) - sizes) // WINDOW
         heads = np.flatnonzero(fresh)
         bounds = heads[np.concatenate([[True], group[heads][1:] != group[heads][:-1]])]
         yield from itertools.pairwise([*bounds.tolist(), len(starts)])
@@ -138,11 +143,14 @@ class _Evaluation:
         patches, numbering = self.patches, self.numbering
         t = numbering.abscissae
         records = self._records(len(edges) * len(t)).reshape(len(edges), len(t))
-        position = evaluate.edge_points(patches.curves[edges], t)
-        normal = evaluate.edge_normals(patches.fields[fields], t)
-        turn = numbering.reversed[edges]
-        position[turn], normal[turn] = position[turn, ::-1], normal[turn, ::-1]
-        records["position"], records["normal"] = position, normal
+        turn = np.flatnonzero(numbering.reversed[edges])
+        for name, values in (
+            ("position", evaluate.edge_points(patches.curves[:, edges], t)),
+            ("normal", evaluate.edge_normals(patches.fields[:, fields], t)),
+        ):
+            values[:, turn] = values[:, turn, ::-1]
+            for i in range(3):
+                records[name][..., i] = values[i]
         topology = patches.topology
         low = topology.vertices[half_edges] < topology.vertices[topology.next[half_edges]]
         first = np.where(low, half_edges, topology.next[half_edges])

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from curvify.mesh import Floats, Ints
-from curvify.polygons import corner_crosses, newell_normals, next_corners, previous_corners
+from curvify.arrays import cross
+from curvify.mesh import Bools, Floats, Ints
+from curvify.polygons import next_corners, previous_corners
 
 #: Corner normals closer than this are one normal (degrees).
 SAME_NORMAL = 0.1
@@ -19,8 +20,10 @@ FLAT_SHADED = 0.5
 
 def unit(vectors: Floats) -> Floats:
     """Vectors ``(...,3)`` scaled to length 1; those without length stay zero."""
-    length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None]
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+    square = np.einsum("...i,...i->...", vectors, vectors)
+    length = np.sqrt(square)
+    length[length == 0] = 1.0
+    return vectors / length[..., None]
 
 
 def dot(a: Floats, b: Floats) -> Floats:
@@ -34,38 +37,31 @@ def degrees_between(a: Floats, b: Floats) -> Floats:
     return np.degrees(2 * np.arctan2(np.linalg.norm(ua - ub, axis=-1), np.linalg.norm(ua + ub, axis=-1)))
 
 
-def corner_normals(positions: Floats, offsets: Ints, vertices: Ints) -> Floats:
-    """Unit normal of each face at each of its corners ``(C,3)``, zero where the face has no area.
+def corner_normals(positions: Floats, offsets: Ints, vertices: Ints, area: Floats) -> tuple[Floats, Floats]:
+    """Unit normal ``(C,3)`` and interior angle ``(C,)``, in radians, of each face at each of its corners.
 
-    Triangles and quads: the cross of the two sides, turned to the side of the area normal, which itself
-    serves where the sides are collinear. Larger polygons: the area normal, since the crosses of a warped
-    polygon can cancel at a vertex.
+    ``area (F,3)`` are the faces' area vectors. Triangles and quads: the cross of the two sides, turned to the side of
+    the area normal, which itself serves where the sides are collinear. Larger polygons: the area normal, since the
+    crosses of a warped polygon can cancel at a vertex. Zero where the face has no area. The angle of a reflex corner
+    is above pi.
     """
     sizes = np.diff(offsets)
-    faces = np.repeat(np.arange(len(sizes)), sizes)
-    area = unit(newell_normals(positions, offsets, vertices))[faces]
-    crosses = corner_crosses(positions, offsets, vertices)
-    points = positions[vertices]
-    side = np.linalg.norm(points[next_corners(offsets)] - points, axis=1)
-    sine = np.linalg.norm(crosses, axis=1)
-    straight = sine <= 1e-12 * side * side[previous_corners(offsets)]
-    normals = unit(crosses) * np.where(dot(crosses, area) < 0, -1.0, 1.0)
-    own = (straight | (sizes[faces] > 4))[:, None]
-    return np.where(own, area, normals)
-
-
-def corner_angles(positions: Floats, offsets: Ints, vertices: Ints) -> Floats:
-    """Interior angle of each corner ``(C,)`` in radians, above pi where the polygon is reflex."""
-    sizes = np.diff(offsets)
-    faces = np.repeat(np.arange(len(sizes)), sizes)
-    crosses = corner_crosses(positions, offsets, vertices)
     points = positions[vertices]
     ahead = points[next_corners(offsets)] - points
-    back = points[previous_corners(offsets)] - points
-    angle = np.arctan2(np.linalg.norm(crosses, axis=1), np.einsum("ci,ci->c", ahead, back))
-    area = newell_normals(positions, offsets, vertices)
-    reflex = np.einsum("ci,ci->c", crosses, area[faces]) < 0
-    return np.where(reflex, 2 * np.pi - angle, angle)
+    back = -ahead[previous_corners(offsets)]
+    crosses = cross(ahead, back)
+    sine, cosine = np.linalg.norm(crosses, axis=1), np.einsum("ci,ci->c", ahead, back)
+    face_normals = np.repeat(unit(area), sizes, axis=0)
+    reflex = np.einsum("ci,ci->c", crosses, face_normals) < 0
+    straight = sine <= 1e-12 * np.hypot(sine, cosine)
+    angles = np.arctan2(sine, cosine)
+    angles[reflex] = 2 * np.pi - angles[reflex]
+    length = np.where(reflex, -sine, sine)
+    length[straight] = 1.0
+    normals = crosses / length[:, None]
+    own = straight | np.repeat(sizes > 4, sizes)
+    normals[own] = face_normals[own]
+    return normals, angles
 
 
 def sum_by(labels: Ints, values: Floats, count: int) -> Floats:
@@ -73,36 +69,34 @@ def sum_by(labels: Ints, values: Floats, count: int) -> Floats:
     return np.stack([np.bincount(labels, values[:, i], count) for i in range(3)], axis=1)
 
 
-def sector_normals(positions: Floats, offsets: Ints, vertices: Ints, sectors: Ints) -> Floats:
+def sector_normals(positions: Floats, offsets: Ints, vertices: Ints, area: Floats, sectors: Ints) -> Floats:
     """Computed normal of each corner's sector ``(C,3)``: the mean of its corner normals weighted by angle.
 
-    ``sectors (C,)`` labels corners by their sector. Where the sum vanishes, the area normal of the largest
-    face of the sector serves.
+    ``area (F,3)`` are the faces' area vectors, ``sectors (C,)`` labels corners by their sector. Where the sum
+    vanishes, the area normal of the largest face of the sector serves.
     """
-    normals = corner_normals(positions, offsets, vertices)
-    weighted = normals * corner_angles(positions, offsets, vertices)[:, None]
-    count = len(vertices)
-    total = sum_by(sectors, weighted, count)
-    vanishing = np.linalg.norm(total, axis=1) < 1e-9
+    normals, angles = corner_normals(positions, offsets, vertices, area)
+    total = sum_by(sectors, normals * angles[:, None], len(vertices))
+    vanishing: Bools = np.all(np.abs(total) < 1e-9, axis=1)
     if vanishing[sectors].any():
-        area = newell_normals(positions, offsets, vertices)[np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))]
-        order = np.argsort(np.einsum("ci,ci->c", area, area), kind="stable")
+        of_corner = np.repeat(area, np.diff(offsets), axis=0)
+        order = np.argsort(np.einsum("ci,ci->c", of_corner, of_corner), kind="stable")
         largest = np.zeros_like(total)
-        largest[sectors[order]] = area[order]
+        largest[sectors[order]] = of_corner[order]
         total[vanishing] = largest[vanishing]
     return unit(total)[sectors]
 
 
-def is_flat_shaded(normals: Floats, positions: Floats, offsets: Ints, vertices: Ints) -> bool:
+def is_flat_shaded(normals: Floats, offsets: Ints, area: Floats) -> bool:
     """Whether given corner normals ``(C,3)`` only repeat the faces' own: a flat-shaded export.
 
-    True when every face has one normal for all its corners, or every corner normal equals its face's area
-    normal within half a degree.
+    True when every face has one normal for all its corners, or every corner normal equals its face's, given by the
+    area vectors ``area (F,3)``, within half a degree.
     """
-    faces = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
-    first = normals[offsets[:-1]][faces]
+    sizes = np.diff(offsets)
+    first = np.repeat(normals[offsets[:-1]], sizes, axis=0)
     if bool((degrees_between(normals, first) <= SAME_NORMAL).all()):
         return True
-    area = newell_normals(positions, offsets, vertices)[faces]
-    sized = np.linalg.norm(area, axis=1) > 0
-    return bool((degrees_between(normals[sized], area[sized]) <= FLAT_SHADED).all())
+    own = np.repeat(area, sizes, axis=0)
+    sized = own.any(axis=1)
+    return bool((degrees_between(normals[sized], own[sized]) <= FLAT_SHADED).all())

@@ -20,7 +20,7 @@ from curvify.topology import (
     Topology,
     build_topology,
     clean_loops,
-    components,
+    fans,
     is_closed,
     signed_volume,
     weld_vertices,
@@ -34,9 +34,11 @@ LARGEST_COORDINATE = 1e60
 
 @dataclass(eq=False)
 class Coarse:
-    """A mesh ready for a scheme: ``positions (V,3)`` as read, ``stand_in (V,)`` the vertex that
-    each is welded to, welded ``loops``, their ``topology``, and
-    ``given (C,3)`` unit normals of the corners or None where they are to be computed.
+    """A mesh ready for a scheme.
+
+    ``positions (V,3)`` as read, ``stand_in (V,)`` the vertex that each is welded to; welded ``loops``, their
+    ``topology``, area vectors ``area (F,3)`` and ``fans (C,)``; ``given (C,3)`` unit normals of the corners, or None
+    where they are to be computed.
     """
 
     mesh: PolygonMesh
@@ -44,6 +46,8 @@ class Coarse:
     stand_in: Ints
     loops: Loops
     topology: Topology
+    area: Floats
+    fans: Ints
     given: Floats | None
     split_by_normals: bool
     warnings: list[str] = field(default_factory=list)
@@ -53,7 +57,9 @@ class Coarse:
         """Normals and end tangents, with the vertices ``corners (V,)`` as corners."""
         if corners is None:
             corners = np.zeros(len(self.positions), dtype=bool)
-        return resolve_features(self.topology, self.positions, self.given, corners, self.split_by_normals)
+        return resolve_features(
+            self.topology, self.positions, self.area, self.fans, self.given, corners, self.split_by_normals
+        )
 
 
 def prepare_mesh(mesh: PolygonMesh, weld: str = "auto", sharp_from: str = "auto") -> Coarse:
@@ -76,7 +82,10 @@ def prepare_mesh(mesh: PolygonMesh, weld: str = "auto", sharp_from: str = "auto"
     if not len(loops.source_faces):
         raise MeshError("every face has fewer than 3 distinct corners; there is nothing to refine")
     topology = build_topology(positions, loops.offsets, loops.vertices)
-    coarse = Coarse(mesh, positions, stand_in, loops, topology, None, sharp_from != "none")
+    area = newell_normals(positions, loops.offsets, loops.vertices)
+    coarse = Coarse(
+        mesh, positions, stand_in, loops, topology, area, fans(topology), None, sharp_from != "none"
+    )
     coarse.warnings += mesh.warnings
     _note_topology(coarse, int((stand_in != np.arange(len(stand_in))).sum()))
     coarse.given = _given_normals(coarse, sharp_from)
@@ -106,7 +115,7 @@ def _note_topology(coarse: Coarse, welded: int) -> None:
     counts, warnings = coarse.counts, coarse.warnings
     used = np.zeros(mesh.vertex_count, dtype=bool)
     used[mesh.face_vertices] = True
-    fan_vertices = topology.vertices[np.flatnonzero(np.bincount(_fans(topology)))]
+    fan_vertices = topology.vertices[np.flatnonzero(np.bincount(coarse.fans))]
     counts.update(
         vertices=mesh.vertex_count,
         faces=mesh.face_count,
@@ -129,36 +138,26 @@ def _note_topology(coarse: Coarse, welded: int) -> None:
             f"{count_of(counts['nonmanifold_edges'], 'edge')} with more than two faces or with faces that run the same "
             f"way, first: {a}-{b}; each face treats them as a boundary"
         )
-    area = newell_normals(coarse.positions, loops.offsets, loops.vertices)
-    flat = np.flatnonzero(_without_area(coarse, area))
+    flat = np.flatnonzero(_without_area(coarse))
     counts["zero_area_faces"] = len(flat)
     if len(flat):
         warnings.append(
             f"{count_of(len(flat), 'face')} without area, first: {loops.source_faces[flat[0]]}; refined flat"
         )
-    if is_closed(topology) and signed_volume(coarse.positions, loops.offsets, loops.vertices) < 0:
+    if is_closed(topology) and signed_volume(coarse.positions, loops.offsets, loops.vertices, coarse.area) < 0:
         warnings.append("the mesh is closed and inside out: its faces run clockwise seen from outside")
     if mesh.marks.counts():
         found = ", ".join(f"{n} {kind}" for kind, n in mesh.marks.counts().items())
         warnings.append(f"the file has marks ({found}) that this version does not use yet")
 
 
-def _fans(topology: Topology) -> Ints:
-    """Label of the fan of each corner: corners joined across interior edges."""
-    one = np.flatnonzero(topology.twin > np.arange(len(topology.twin)))
-    other = topology.twin[one]
-    a = np.concatenate([one, topology.next[one]])
-    b = np.concatenate([topology.next[other], other])
-    return components(len(topology.vertices), a, b)
-
-
-def _without_area(coarse: Coarse, area: Floats) -> Bools:
+def _without_area(coarse: Coarse) -> Bools:
     """Faces ``(F,)`` whose area is nothing against the square of their longest side."""
     topology = coarse.topology
     points = coarse.positions[topology.vertices]
-    square = np.einsum("ci,ci->c", points[topology.next] - points, points[topology.next] - points)
-    longest = np.maximum.reduceat(square, topology.offsets[:-1])
-    return np.linalg.norm(area, axis=1) <= 1e-12 * longest
+    sides = points[topology.next] - points
+    longest = np.maximum.reduceat(np.einsum("ci,ci->c", sides, sides), topology.offsets[:-1])
+    return np.linalg.norm(coarse.area, axis=1) <= 1e-12 * longest
 
 
 def _given_normals(coarse: Coarse, sharp_from: str) -> Floats | None:
@@ -172,7 +171,7 @@ def _given_normals(coarse: Coarse, sharp_from: str) -> Floats | None:
     present = given.any(axis=1)
     if not present.any():
         return None
-    flat = present.all() and is_flat_shaded(given, coarse.positions, loops.offsets, loops.vertices)
+    flat = present.all() and is_flat_shaded(given, loops.offsets, coarse.area)
     if flat and sharp_from == "auto":
         if _normals_differ(topology, given):
             coarse.warnings.append(
@@ -180,7 +179,7 @@ def _given_normals(coarse: Coarse, sharp_from: str) -> Floats | None:
             )
         return None
     if not present.all():
-        computed = sector_normals(coarse.positions, loops.offsets, loops.vertices, _fans(topology))
+        computed = sector_normals(coarse.positions, loops.offsets, loops.vertices, coarse.area, coarse.fans)
         given[~present] = computed[~present]
         missing = count_of(int((~present).sum()), "corner")
         coarse.warnings.append(f"{missing} without a normal in the file, computed from the faces")

@@ -16,8 +16,7 @@ from curvify.arrays import cross
 from curvify.edges import LEAST_ADVANCE, bending_normals, smooth_tangents
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import SAME_NORMAL, degrees_between, dot, sector_normals, sum_by, unit
-from curvify.polygons import newell_normals
-from curvify.topology import Topology, components
+from curvify.topology import Topology, components, corner_links
 
 #: The largest turn of a line at a vertex where it still runs on smoothly (degrees).
 BOUNDARY_TURN = 75.0
@@ -43,42 +42,46 @@ class Features:
 
 
 def resolve_features(
-    topology: Topology, positions: Floats, given: Floats | None, corners: Bools, split_by_normals: bool = True
+    topology: Topology,
+    positions: Floats,
+    area: Floats,
+    fans: Ints,
+    given: Floats | None,
+    corners: Bools,
+    split_by_normals: bool = True,
 ) -> Features:
     """Resolve normals and tangents from ``given (C,3)`` unit corner normals, or from the faces where None.
 
-    ``corners (V,)`` are vertices that must be corners; given normals that differ make creases only if
-    ``split_by_normals``, else they are averaged.
+    ``area (F,3)`` are the faces' area vectors, ``fans (C,)`` the fan of each corner. ``corners (V,)`` are vertices
+    that must be corners; given normals that differ make creases only if ``split_by_normals``, else they are averaged.
     """
-    sectors = _sectors(topology, given if split_by_normals else None)
+    sectors = fans if given is None or not split_by_normals else _sectors(topology, given)
     if given is None:
-        normals = sector_normals(positions, topology.offsets, topology.vertices, sectors)
+        normals = sector_normals(positions, topology.offsets, topology.vertices, area, sectors)
     else:
         normals = unit(sum_by(sectors, given, len(sectors)))[sectors]
     sharp = _sharp_ends(topology, sectors)
     lines, turned = _line_tangents(topology, positions, sharp)
     tangled = _touched(topology, topology.nonmanifold)
-    corners = corners | (tangled & ~lines.any(axis=1))
+    lined = lines.any(axis=1)
+    corners = corners | (tangled & ~lined)
     if given is None:
         corners = corners | turned
-    straighten = lines.any(axis=1) & ~corners & (tangled | (given is None))
-    t = lines[topology.vertices]
-    normals = np.where(straighten[topology.vertices][:, None], unit(normals - dot(normals, t) * t), normals)
-    tangents, bending = _end_tangents(topology, positions, normals, lines, sharp, corners)
+    straighten = (lined & ~corners & (tangled | (given is None)))[topology.vertices]
+    if straighten.any():
+        t = lines[topology.vertices[straighten]]
+        old = normals[straighten]
+        normals[straighten] = unit(old - dot(old, t) * t)
+    tangents, bending = _end_tangents(topology, positions, area, normals, lines, sharp, corners)
     normals, adjusted = _fit_normals(topology, normals, tangents, corners)
     return Features(normals, tangents, bending, sharp, corners, adjusted)
 
 
-def _sectors(topology: Topology, given: Floats | None) -> Ints:
-    """Sector label of each corner: corners joined across the edge ends that are smooth."""
-    one = np.flatnonzero(topology.twin > np.arange(len(topology.twin)))
-    other = topology.twin[one]
-    a = np.concatenate([one, topology.next[one]])
-    b = np.concatenate([topology.next[other], other])
-    if given is not None:
-        smooth = degrees_between(given[a], given[b]) <= SAME_NORMAL
-        a, b = a[smooth], b[smooth]
-    return components(len(topology.vertices), a, b)
+def _sectors(topology: Topology, given: Floats) -> Ints:
+    """Sector label of each corner: corners joined across the edge ends where their normals are one."""
+    a, b = corner_links(topology)
+    smooth = degrees_between(given[a], given[b]) <= SAME_NORMAL
+    return components(len(topology.vertices), a[smooth], b[smooth])
 
 
 def _sharp_ends(topology: Topology, sectors: Ints) -> Bools:
@@ -128,39 +131,46 @@ def _line_tangents(topology: Topology, positions: Floats, sharp: Bools) -> tuple
 
 def sides_of_edges(topology: Topology) -> tuple[Ints, Ints]:
     """First and last half-edge of each edge ``(E,)``: the same one on a plain boundary."""
-    first = np.full(len(topology.edges), len(topology.edge))
-    np.minimum.at(first, topology.edge, np.arange(len(topology.edge)))
-    last = np.zeros(len(topology.edges), dtype=np.int64)
-    np.maximum.at(last, topology.edge, np.arange(len(topology.edge)))
+    half_edges = np.arange(len(topology.edge))
+    first, last = (np.empty(len(topology.edges), dtype=np.int64) for _ in range(2))
+    first[topology.edge[::-1]] = half_edges[::-1]
+    last[topology.edge] = half_edges
     return first, last
 
 
 def _end_tangents(
-    topology: Topology, positions: Floats, normals: Floats, lines: Floats, sharp: Bools, corners: Bools
+    topology: Topology,
+    positions: Floats,
+    area: Floats,
+    normals: Floats,
+    lines: Floats,
+    sharp: Bools,
+    corners: Bools,
 ) -> tuple[Floats, Floats]:
     """Unit tangents ``(E,2,3)`` and bending normals ``(E,3)`` of all edges."""
     chord = positions[topology.edges[:, 1]] - positions[topology.edges[:, 0]]
-    along = unit(chord)
     first, last = sides_of_edges(topology)
-    one, other = (end_normals(topology, normals, side) for side in (first, last))
-    mean = np.where((one == other).all(axis=2, keepdims=True), one, unit(one + other))
-    area = newell_normals(positions, topology.offsets, topology.vertices)[topology.faces]
-    bending = bending_normals(chord, mean[:, 0], mean[:, 1], area[first] + area[last])
+    mean = end_normals(topology, normals, first)
+    several = np.flatnonzero(sharp.any(axis=1) | topology.nonmanifold)
+    one, other = mean[several], end_normals(topology, normals, last[several])
+    mean[several] = np.where((one == other).all(axis=2, keepdims=True), one, unit(one + other))
+    faces = topology.faces
+    bending = bending_normals(chord, mean[:, 0], mean[:, 1], area[faces[first]] + area[faces[last]])
     tangents = np.empty((len(chord), 2, 3))
     for end in (0, 1):
-        vertex = topology.edges[:, end]
-        line = lines[vertex] * np.where(dot(lines[vertex], along) < 0, -1.0, 1.0)
-        tangent = smooth_tangents(chord, mean[:, end], bending)
-        split = sharp[:, end]
-        if split.any():
-            tangent[split] = _crease_tangents(
-                along[split], one[split, end], other[split, end], mean[split, end], line[split]
-            )
-        rim = ~topology.interior & line.any(axis=1)
-        tangent[rim] = unit(line[rim] - dot(line[rim], mean[rim, end]) * mean[rim, end])
-        straight = corners[vertex] & (split | ~topology.interior)
-        tangent[straight] = along[straight]
-        tangents[:, end] = tangent
+        tangents[:, end] = smooth_tangents(chord, mean[:, end], bending)
+        split = np.flatnonzero(sharp[several, end])
+        rows = several[split]
+        along = unit(chord[rows])
+        tangents[rows, end] = _crease_tangents(
+            along, one[split, end], other[split, end], mean[rows, end], lines[topology.edges[rows, end]]
+        )
+        rim = np.flatnonzero(~topology.interior & lines[topology.edges[:, end]].any(axis=1))
+        line = lines[topology.edges[rim, end]]
+        line *= np.where(dot(line, chord[rim]) < 0, -1.0, 1.0)
+        tangents[rim, end] = unit(line - dot(line, mean[rim, end]) * mean[rim, end])
+        straight = corners[topology.edges[:, end]] & (sharp[:, end] | ~topology.interior)
+        tangents[straight, end] = unit(chord[straight])
     return tangents, bending
 
 
@@ -173,6 +183,7 @@ def end_normals(topology: Topology, normals: Floats, half_edges: Ints) -> Floats
 
 def _crease_tangents(along: Floats, left: Floats, right: Floats, mean: Floats, line: Floats) -> Floats:
     """Tangent ``(k,3)`` where two normals meet: their common perpendicular, towards the line or the edge."""
+    line = line * np.where(dot(line, along) < 0, -1.0, 1.0)
     guide = np.where(line.any(axis=1, keepdims=True), line, along)
     across = unit(cross(left, right))
     tangent = across * np.where(dot(across, guide) < 0, -1.0, 1.0)

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from curvify.arrays import cross, distinct
+from curvify.arrays import distinct
 from curvify.mesh import Bools, Floats, Ints
-from curvify.polygons import next_corners, previous_corners
+from curvify.polygons import newell_normals, next_corners, previous_corners
 
 
 @dataclass(eq=False)
@@ -208,12 +208,27 @@ def is_closed(topology: Topology) -> bool:
     return bool(len(topology.edges)) and bool(topology.interior.all())
 
 
-def signed_volume(positions: Floats, offsets: Ints, vertices: Ints) -> float:
-    """Volume enclosed by closed loops, negative where they face inwards; each face as a fan about its mean."""
-    following = next_corners(offsets)
-    sizes = np.maximum(np.diff(offsets), 1)
-    faces = np.repeat(np.arange(len(sizes)), np.diff(offsets))
+def signed_volume(positions: Floats, offsets: Ints, vertices: Ints, area: Floats | None = None) -> float:
+    """Volume enclosed by closed loops, negative where they face inwards.
+
+    Each face counts as the fan of triangles about the mean of its corners. ``area (F,3)``: the faces' area vectors,
+    where they are known.
+    """
+    if area is None:
+        area = newell_normals(positions, offsets, vertices)
     points = positions[vertices] - positions.mean(axis=0)
-    centers = np.stack([np.bincount(faces, points[:, i], len(sizes)) for i in range(3)], axis=1) / sizes[:, None]
-    triple = np.einsum("ci,ci->c", centers[faces], cross(points, points[following]))
-    return float(triple.sum() / 6)
+    along = np.einsum("ci,ci->c", points, np.repeat(area / np.diff(offsets)[:, None], np.diff(offsets), axis=0))
+    return float(along.sum() / 6)
+
+
+def fans(topology: Topology) -> Ints:
+    """Label ``(C,)`` of the fan of each corner: corners of a vertex joined across interior edges."""
+    a, b = corner_links(topology)
+    return components(len(topology.vertices), a, b)
+
+
+def corner_links(topology: Topology) -> tuple[Ints, Ints]:
+    """Corners that lie side by side at the ends of the interior edges: two arrays, both ends of each edge."""
+    one = np.flatnonzero(topology.twin > np.arange(len(topology.twin)))
+    other = topology.twin[one]
+    return np.concatenate([one, topology.next[one]]), np.concatenate([topology.next[other], other])

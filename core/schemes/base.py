@@ -2,7 +2,7 @@
 
 A surface form over a polygon domain is
 
-    G(x) = sum_i linear_i(x) c_i  +  sum_k weight_k(x) T_k(u_k(x))
+    G(x) = sum_i linear_i(x) c_i  +  sum_k weight_k(x) T_k(u_k(x)) + start_k(x) T_k(0) + end_k(x) T_k(1)
 
 with control vectors ``c_i`` and side fields ``T_k`` that depend on one variable. Most schemes have no side
 fields. A backend multiplies tables and control vectors; it needs to know nothing else about a scheme.
@@ -27,12 +27,14 @@ class Basis:
     """A basis at ``S`` points of a domain; leading axis: value, derivative by xi, derivative by eta.
 
     ``linear (3,S,L)``; ``weights (3,S,n)`` of the side fields and ``abscissae (3,S,n)``, where on its side each
-    field is taken. Schemes without side fields have n = 0 there.
+    field is taken; ``ends (3,S,n,2)`` weights of the fields' values at 0 and 1. Schemes without side fields have
+    n = 0 there.
     """
 
     linear: Floats
     weights: Floats
     abscissae: Floats
+    ends: Floats
 
 
 class Controls(Protocol):
@@ -82,7 +84,7 @@ class Patches:
     ``positions (V,3)`` of the input's vertices, ``stand_in (V,)`` the vertex that each was welded to; ``topology`` of
     the patches (a face may be cut into several); ``source_faces (P,)`` the input face of each patch, ascending;
     ``source_corners (C,)`` the input corner of each patch corner. The last D edges lie inside cut faces,
-    ``inner_faces (D,)``, ascending. ``curves (E,d+1,3)`` Bezier points of the edges; ``fields (N,q+1,3)`` Bezier
+    ``inner_faces (D,)``, ascending. ``curves (3,E,d+1)`` Bezier points of the edges; ``fields (3,N,q+1)`` Bezier
     points of edge normals, not of unit length, the first E those of the edges' first half-edges, and
     ``side_field (C,)`` the one on each half-edge; ``normals (C,3)`` unit normal of each patch corner.
     ``warnings`` and ``counts`` for the report.

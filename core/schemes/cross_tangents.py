@@ -87,6 +87,11 @@ class ProjectedBlend:
         factor, slope = self._factor(t)
         return factor * y, slope * y + factor * y_slope
 
+    def inward(self, t: Floats) -> Floats:
+        """What T points towards across the edge: Y before its part along n_c is taken away."""
+        h, _ = self._step(t)
+        return self.sides.start[..., None] * h + self.sides.end[..., None] * (1 - h)
+
     def _step(self, t: Floats) -> tuple[Floats, Floats]:
         """The share h of the start, and h'."""
         if self.kind == "precise":
@@ -171,6 +176,10 @@ class PaperTangent:
     def fields(self, t: Floats) -> Floats:
         """T at ``t``: ``(3,f,n,m)``."""
         return self.field_derivatives(t)[0]
+
+    def inward(self, t: Floats) -> Floats:
+        """T itself."""
+        return self.fields(t)
 
     def field_derivatives(self, t: Floats) -> tuple[Floats, Floats]:
         """T and T' at ``t`` (equation 11 with the end corrections)."""

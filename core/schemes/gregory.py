@@ -70,10 +70,13 @@ def prepare(mesh: PolygonMesh, options: Options | None = None) -> Patches:
     options = options or Options()
     coarse = prepare_mesh(mesh, options.weld, options.sharp_from)
 
-    def tangents_of(work: Patchwork, corners: Ints) -> CrossTangent:
-        return cross_tangents(work, corners, options)[1]
+    def inward(work: Patchwork, corners: Ints) -> CrossTangent:
+        points, sides = patch_sides(work, corners)
+        if options.cross_tangent in ("precise", "smooth"):  # their fullness does not change the side
+            return ProjectedBlend(sides, options.cross_tangent, np.zeros(corners.shape))
+        return paper_tangent(sides, points, work.corner_normals(corners), options)
 
-    work = build_patchwork(coarse, options.tangent_lengths, options.split_rule, tangents_of)
+    work = build_patchwork(coarse, options.tangent_lengths, options.split_rule, inward)
     classes = []
     for sides, patches in work.size_classes():
         corners = work.topology.offsets[patches][:, None] + np.arange(sides)
@@ -126,7 +129,7 @@ class GregoryControls:
         value, slope = tangent.field_derivatives(np.array([0.0, 0.5, 1.0]))
         curves = tangent.sides.curves
         corrected = target is not None
-        blocks = [points, curves[..., 1], curves[..., 2], value[..., 0], value[..., 2], slope[..., 0], slope[..., 2]]
+        blocks = [points, curves[..., 1], curves[..., 2], slope[..., 0], slope[..., 2]]
         if corrected and n != 4:
             blocks.append(value[..., 1] / side_speed(n, np.array([0.5]))[0])
         linear = np.zeros((3, len(corners), n * len(blocks) + corrected))
@@ -135,6 +138,7 @@ class GregoryControls:
         if target is not None:
             basis = center_row(n, True)
             center = linear @ basis.linear[0, 0] + value[..., 1] @ basis.weights[0, 0]
+            center += value[..., 0] @ basis.ends[0, 0, :, 0] + value[..., 2] @ basis.ends[0, 0, :, 1]
             linear[..., -1] = target - center
         return cls(linear, tangent)
 
@@ -143,17 +147,23 @@ def cross_tangents(
     work: Patchwork, corners: Ints, options: Options
 ) -> tuple[Floats, CrossTangent, Floats | None]:
     """Corner points ``(3,f,n)``, cross tangents and, for ``precise``, the center point ``(3,f)`` of patches."""
-    points, normals = work.corner_points(corners), work.corner_normals(corners)
-    curves, fields = work.side_curves(corners), work.side_fields(corners)
-    start = 3 * (np.roll(curves[..., 2], 1, axis=2) - points)
-    end = 3 * (np.roll(curves[..., 1], -1, axis=2) - np.roll(points, -1, axis=2))
-    sides = Sides(curves, fields, start, end)
+    points, sides = patch_sides(work, corners)
+    if options.cross_tangent == "smooth":
+        return points, smooth_tangent(sides), None
+    normals = work.corner_normals(corners)
     if options.cross_tangent == "precise":
         target = center_point(points, normals)
         return points, precise_tangent(sides, target), target
-    if options.cross_tangent == "smooth":
-        return points, smooth_tangent(sides), None
     return points, paper_tangent(sides, points, normals, options), None
+
+
+def patch_sides(work: Patchwork, corners: Ints) -> tuple[Floats, Sides]:
+    """Corner points ``(3,f,n)`` and side data of patches."""
+    points = work.corner_points(corners)
+    curves, fields = work.side_curves(corners), work.side_fields(corners)
+    start = 3 * (np.roll(curves[..., 2], 1, axis=2) - points)
+    end = 3 * np.roll(curves[..., 1] - points, -1, axis=2)
+    return points, Sides(curves, fields, start, end)
 
 
 def precise_tangent(sides: Sides, target: Floats) -> ProjectedBlend:

@@ -2,9 +2,9 @@
 
 Source: Leung, Wang, Zhang, equations (1), (3), (4) (J. Gregory's corner interpolators), written as one linear
 combination per face; the polynomial correction and the center function are ours (docs/mathematics.md).
-Per side k of a face the control vectors are, in this order, the Bezier points p_k, Q0_k, Q1_k of its edge, the
-cross tangent and its derivative at the two ends T_k(0), T_k(1), T'_k(0), T'_k(1); then, for the corrected
-patch, T_k(1/2)/s(1/2) (n != 4) and one vector that moves the center.
+Per side k of a face the control vectors are, in this order, the Bezier points p_k, Q0_k, Q1_k of its edge and the
+derivative of the cross tangent at its two ends, T'_k(0), T'_k(1); then, for the corrected patch, T_k(1/2)/s(1/2)
+(n != 4) and one vector that moves the center. The cross tangents are the side fields.
 """
 
 from __future__ import annotations
@@ -17,9 +17,6 @@ from curvify.mesh import Floats, Ints
 from curvify.sampling import domain_corners
 from curvify.schemes.base import Basis, bernstein_basis, bernstein_slopes
 from curvify.schemes.domain import Domain, domain_jets, jet_compose, jet_product
-
-#: Control vectors per side of the plain patch.
-PLAIN = 7
 
 
 def gregory_basis(sides: int, points: Floats, corrected: bool) -> Basis:
@@ -35,10 +32,18 @@ def gregory_basis(sides: int, points: Floats, corrected: bool) -> Basis:
             blocks[2] -= 3 * tau1
             blocks.append(middle)
         blocks.append(_center_bump(domain))
-    linear = np.concatenate(blocks, axis=1).transpose(0, 2, 1)
-    return Basis(
-        np.ascontiguousarray(linear), weights.transpose(0, 2, 1).copy(), domain.u.transpose(0, 2, 1).copy()
-    )
+    return _basis(np.concatenate(blocks, axis=1), weights, domain.u, _end_weights(domain))
+
+
+def _basis(linear: Floats, weights: Floats, u: Floats, ends: Floats) -> Basis:
+    """Jets ``(3,c,S)`` and, of the ends, ``(2,3,n,S)``, with the samples before the columns."""
+    linear, weights, u = (np.ascontiguousarray(np.swapaxes(jets, 1, 2)) for jets in (linear, weights, u))
+    return Basis(linear, weights, u, np.ascontiguousarray(ends.transpose(1, 3, 2, 0)))
+
+
+def _end_weights(domain: Domain) -> Floats:
+    """Weights of T_k(0) and T_k(1): jets ``(2,3,n,S)``."""
+    return np.stack([-jet_product(domain.w, domain.v), -np.roll(jet_product(domain.w, domain.u), -1, axis=1)])
 
 
 def edge_normal_basis(sides: int, points: Floats) -> Basis:
@@ -48,8 +53,7 @@ def edge_normal_basis(sides: int, points: Floats) -> Basis:
     """
     domain = domain_jets(sides, points)
     both = domain.w + np.roll(domain.w, -1, axis=1)
-    linear, weights, u = (jets.transpose(0, 2, 1).copy() for jets in (-domain.w, both, domain.u))
-    return Basis(linear, weights, u)
+    return _basis(-domain.w, both, domain.u, np.zeros((2, *domain.w.shape)))
 
 
 def _field_weights(domain: Domain) -> Floats:
@@ -58,7 +62,7 @@ def _field_weights(domain: Domain) -> Floats:
 
 
 def _plain_columns(domain: Domain) -> list[Floats]:
-    """Columns of p, Q0, Q1, T(0), T(1), T'(0), T'(1): jets ``(3,n,S)`` each."""
+    """Columns of p, Q0, Q1, T'(0), T'(1): jets ``(3,n,S)`` each."""
     u, v, w = domain.u, domain.v, domain.w
     both = w + np.roll(w, -1, axis=1)
     values = bernstein_basis(3, u[0])
@@ -70,8 +74,6 @@ def _plain_columns(domain: Domain) -> list[Floats]:
         curve[0] + np.roll(curve[3], 1, axis=1) - w,
         curve[1],
         curve[2],
-        -jet_product(w, v),
-        -np.roll(jet_product(w, u), -1, axis=1),
         -jet_product(w, at_start),
         np.roll(jet_product(w, at_end), -1, axis=1),
     ]

@@ -31,11 +31,11 @@ ROUNDS = 4
 WINDOW = 2048
 
 
-class Fields(Protocol):
-    """Anything with cross tangents."""
+class Inward(Protocol):
+    """Anything that tells on which side of its edges a patch begins."""
 
-    def fields(self, t: Floats) -> Floats:
-        """Cross tangents ``(3,f,n,m)`` at ``t (m,)``."""
+    def inward(self, t: Floats) -> Floats:
+        """Vectors ``(3,f,n,m)`` at ``t (m,)`` on the same side of the edge curve as the cross tangents."""
 
 
 @dataclass(eq=False)
@@ -43,7 +43,7 @@ class Patchwork:
     """Pieces of faces with their curves and normals.
 
     ``topology`` of the pieces; ``split`` where they come from, in terms of the cleaned loops; per edge
-    ``curves (E,4,3)``; ``fields (N,4,3)`` edge normals and ``side_field (C,)`` the one of each half-edge; ``normals
+    ``curves (3,E,4)``; ``fields (3,N,4)`` edge normals and ``side_field (C,)`` the one of each half-edge; ``normals
     (C,3)`` of the corners; ``line_end (C,)`` whether the half-edge is a crease or boundary where it starts.
     """
 
@@ -60,7 +60,7 @@ class Patchwork:
 
     def corner_points(self, corners: Ints) -> Floats:
         """Positions ``(3,f,n)`` of corners ``(f,n)``."""
-        return self.coarse.positions.T[:, self.topology.vertices[corners]]
+        return np.moveaxis(self.coarse.positions[self.topology.vertices[corners]], -1, 0)
 
     def corner_normals(self, corners: Ints) -> Floats:
         """Normals ``(3,f,n)`` of corners ``(f,n)``."""
@@ -68,16 +68,17 @@ class Patchwork:
 
     def side_curves(self, corners: Ints) -> Floats:
         """Bezier points ``(3,f,n,4)`` of the half-edges ``(f,n)``, each in its own direction."""
-        return self._in_direction(self.curves[self.topology.edge[corners]], corners)
+        return self._in_direction(self.curves, self.topology.edge[corners], corners)
 
     def side_fields(self, corners: Ints) -> Floats:
         """Bezier points ``(3,f,n,4)`` of the normal fields of the half-edges ``(f,n)``."""
-        return self._in_direction(self.fields[self.side_field[corners]], corners)
+        return self._in_direction(self.fields, self.side_field[corners], corners)
 
-    def _in_direction(self, points: Floats, corners: Ints) -> Floats:
-        backward = ~self.topology.forward[corners]
-        points[backward] = points[backward][:, ::-1]
-        return np.ascontiguousarray(np.moveaxis(points, -1, 0))
+    def _in_direction(self, points: Floats, rows: Ints, corners: Ints) -> Floats:
+        """The Bezier points ``(3,f,n,4)`` of some rows of ``points (3,N,4)``, turned where half-edges run backward."""
+        forward = self.topology.forward[corners][..., None]
+        order = np.arange(4)
+        return np.take(points.reshape(3, -1), 4 * rows[..., None] + np.where(forward, order, 3 - order), axis=1)
 
     def size_classes(self) -> Iterator[tuple[int, Ints]]:
         """Polygon sizes and the pieces ``(f,)`` of each."""
@@ -108,7 +109,7 @@ class Patchwork:
 
 
 def build_patchwork(
-    coarse: Coarse, lengths: str, split_rule: str, tangents_of: Callable[[Patchwork, Ints], Fields]
+    coarse: Coarse, lengths: str, split_rule: str, tangents_of: Callable[[Patchwork, Ints], Inward]
 ) -> Patchwork:
     """Split faces until no patch folds that splitting can save, and build all curves.
 
@@ -162,15 +163,35 @@ def _build(coarse: Coarse, features: Features, split: Split, lengths: str) -> Pa
         across = np.stack([smooth_tangents(chord, n, extra) for n in (a, b)], axis=1)
         tangents, bending = np.concatenate([tangents, across]), np.concatenate([bending, extra])
     curves = edge_curves(start, end, tangents[:, 0], tangents[:, 1], lengths)
-    own = end_normals(topology, normals, np.arange(len(normals)))
-    differs = np.flatnonzero((own != ends[topology.edge]).any(axis=(1, 2)))
-    differs = differs[np.argsort(topology.edge[differs], kind="stable")]
-    index = topology.edge.copy()
-    index[differs] = len(topology.edges) + np.arange(len(differs))
-    edge = np.concatenate([np.arange(len(topology.edges)), topology.edge[differs]])
-    pair = np.concatenate([ends, own[differs]])
+    side_field, edge, pair = _sides(topology, normals, ends)
     fields = normal_fields(curves[edge], pair[:, 0], pair[:, 1], bending[edge])
-    return Patchwork(coarse, features, split, topology, curves, fields, index, normals)
+    curves, fields = (np.ascontiguousarray(np.moveaxis(points, -1, 0)) for points in (curves, fields))
+    return Patchwork(coarse, features, split, topology, curves, fields, side_field, normals)
+
+
+def _sides(topology: Topology, normals: Floats, ends: Floats) -> tuple[Ints, Ints, Floats]:
+    """Normal fields that the edges need: the one of each half-edge ``(C,)``, the edge and end normals of each field.
+
+    The first E are those of the edges' first half-edges, ``ends (E,2,3)``; half-edges with other normals, on
+    creases, have one of their own.
+    """
+    side_field = topology.edge.copy()
+    edges = np.arange(len(ends))
+    first = np.zeros((topology.vertex_count, 3))
+    first[topology.vertices] = normals
+    several = (normals != first[topology.vertices]).any(axis=1)
+    if not several.any():
+        return side_field, edges, ends
+    split = np.zeros(topology.vertex_count, dtype=bool)
+    split[topology.vertices[several]] = True
+    near = np.flatnonzero(split[topology.vertices] | split[topology.vertices[topology.next]])
+    own = end_normals(topology, normals, near)
+    differs = (own != ends[topology.edge[near]]).any(axis=(1, 2))
+    own, near = own[differs], near[differs]
+    order = np.argsort(topology.edge[near], kind="stable")
+    own, near = own[order], near[order]
+    side_field[near] = len(ends) + np.arange(len(near))
+    return side_field, np.concatenate([edges, topology.edge[near]]), np.concatenate([ends, own])
 
 
 def _piece_topology(coarse: Coarse, split: Split) -> Topology:
@@ -192,34 +213,26 @@ def _piece_topology(coarse: Coarse, split: Split) -> Topology:
 def _corner_sines(work: Patchwork) -> Floats:
     """Sine ``(C,)`` between the two curves at each corner, negative where the patch folds there."""
     topology = work.topology
-    curves = work.curves[topology.edge]
-    forward = topology.forward[:, None]
-    point = work.coarse.positions[topology.vertices]
-    out = np.where(forward, curves[:, 1], curves[:, 2]) - point
-    arriving = np.where(forward, curves[:, 2], curves[:, 1])
-    back = arriving[topology.prev] - point
-    lengths = np.linalg.norm(out, axis=1) * np.linalg.norm(back, axis=1)
-    volume = np.einsum("ci,ci->c", cross(out, back), work.normals)
+    point = work.coarse.positions[topology.vertices].T
+    first, last = work.curves[:, :, 1][:, topology.edge], work.curves[:, :, 2][:, topology.edge]
+    out = np.where(topology.forward, first, last) - point
+    back = np.where(topology.forward, last, first)[:, topology.prev] - point
+    lengths = np.sqrt(np.einsum("ic,ic->c", out, out) * np.einsum("ic,ic->c", back, back))
+    volume = np.einsum("ic,ci->c", cross(out, back, axis=0), work.normals)
     return np.divide(volume, lengths, out=np.zeros_like(volume), where=lengths > 0)
 
 
-def _line_ends(work: Patchwork) -> Bools:
-    """Half-edges ``(C,)`` that are a crease or a boundary where they start."""
+def _straight_through(work: Patchwork, corners: Ints) -> Bools:
+    """Which of some corners lie between two creases or boundaries: those may pass straight through it."""
     topology, features = work.topology, work.features
-    sharp = np.zeros((len(topology.edges), 2), dtype=bool)
-    sharp[: len(features.sharp)] = features.sharp
-    sharp |= ~topology.interior[:, None]
-    return sharp[topology.edge, np.where(topology.forward, 0, 1)]
-
-
-def _arriving_line_ends(work: Patchwork) -> Bools:
-    """Corners ``(C,)`` whose previous half-edge is a crease or a boundary where it ends."""
-    topology, features = work.topology, work.features
-    sharp = np.zeros((len(topology.edges), 2), dtype=bool)
-    sharp[: len(features.sharp)] = features.sharp
-    sharp |= ~topology.interior[:, None]
-    before = topology.prev
-    return sharp[topology.edge[before], np.where(topology.forward[before], 1, 0)]
+    before = topology.prev[corners]
+    result = np.ones(len(corners), dtype=bool)
+    for half_edges, at_start in ((corners, topology.forward[corners]), (before, ~topology.forward[before])):
+        edges = topology.edge[half_edges]
+        known = edges < len(features.sharp)
+        sharp = features.sharp[np.where(known, edges, 0), np.where(at_start, 0, 1)] & known
+        result &= sharp | ~topology.interior[edges]
+    return result
 
 
 def _new_corners(work: Patchwork, sines: Floats) -> Bools:
@@ -235,17 +248,18 @@ def _new_corners(work: Patchwork, sines: Floats) -> Bools:
 
 
 def _bad_corners(
-    work: Patchwork, sines: Floats, tangents_of: Callable[[Patchwork, Ints], Fields]
+    work: Patchwork, sines: Floats, tangents_of: Callable[[Patchwork, Ints], Inward]
 ) -> tuple[Bools, Bools]:
     """Corners ``(C,)`` from which their faces should be split, and the pieces ``(P,)`` that fold.
 
     A corner is bad if it opens too little, unless two creases or boundaries pass straight through it by
     construction; a side is bad if its cross tangent does not point inwards, and counts for its narrower corner.
     """
-    straight = (np.abs(sines) < 1e-9) & _line_ends(work) & _arriving_line_ends(work)
-    bad = (sines <= LEAST_CORNER_SINE) & ~straight
+    bad = sines <= LEAST_CORNER_SINE
+    flat = np.flatnonzero(np.abs(sines) < 1e-9)
+    bad[flat[_straight_through(work, flat)]] = False
     folded = np.zeros(len(work.topology.offsets) - 1, dtype=bool)
-    folded[work.topology.faces[(sines < 0) & ~straight]] = True
+    folded[work.topology.faces[bad & (sines < 0)]] = True
     for size, patches in work.size_classes():
         for begin in range(0, len(patches), WINDOW):
             rows = patches[begin : begin + WINDOW]
@@ -259,13 +273,12 @@ def _bad_corners(
     return bad, folded
 
 
-def _least_inward(work: Patchwork, corners: Ints, tangent: Fields) -> Floats:
-    """Smallest (C' x T).n_c ``(f,n)`` at 9 abscissae of each side."""
+def _least_inward(work: Patchwork, corners: Ints, tangent: Inward) -> Floats:
+    """Smallest (C' x T).n_c ``(f,n)`` at 9 abscissae of each side, up to a positive factor."""
     t = np.arange(1, 10) / 10
     slope = bernstein_slope(work.side_curves(corners), t)
     normal = bernstein(work.side_fields(corners), t)
-    across = tangent.fields(t)
-    return np.einsum("cfnm,cfnm->fnm", cross(slope, across, axis=0), normal).min(axis=-1)
+    return np.einsum("cfnm,cfnm->fnm", cross(normal, slope, axis=0), tangent.inward(t)).min(axis=-1)
 
 
 def _note_splits(work: Patchwork, folded: Bools) -> None:
