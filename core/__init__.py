@@ -18,7 +18,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from curvify.errors import CurvifyError, FormatError, LimitError, MeshError, OptionError
     from curvify.mesh import DenseMesh, Marks, PolygonMesh
-    from curvify.refine import Surface, refine, surface
+    from curvify.refinement import Surface, refine, surface
 
 _WHERE = {
     "CurvifyError": "errors",
@@ -29,9 +29,9 @@ _WHERE = {
     "DenseMesh": "mesh",
     "Marks": "mesh",
     "PolygonMesh": "mesh",
-    "Surface": "refine",
-    "refine": "refine",
-    "surface": "refine",
+    "Surface": "refinement",
+    "refine": "refinement",
+    "surface": "refinement",
 }
 
 __all__ = [

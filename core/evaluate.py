@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -34,11 +34,9 @@ SAMPLES = 2048
 #: From this many sides the fields are evaluated at every sample: the tables would be too large.
 MANY_SIDES = 17
 #: Squared sine below which two derivatives count as parallel.
-PARALLEL = 1e-24
+PARALLEL = 1e-20
 #: Up to this many samples a patch the fields are evaluated at every sample: that is less than at the points.
 FEW_SAMPLES = 9
-#: Tables larger than this many numbers are built when needed and not kept.
-KEPT_TABLE = 1 << 20
 
 
 def chebyshev_points(count: int) -> Floats:
@@ -92,18 +90,50 @@ def _differentiation(count: int) -> Floats:
 class Tables:
     """Tables of one form at the samples ``first`` to ``last`` of a patch.
 
-    ``matrix (K, o*S)`` for control vectors followed by field values, o = 3 orders (value, by xi, by eta) or 1;
-    for ``count`` 0 it has the control vectors only, and ``basis`` serves the fields.
+    Either ``matrix (K, o*S)`` for control vectors followed by field values, o = 3 orders (value, by xi, by eta) or 1;
+    or, where the fields are to be evaluated at every sample, the ``basis`` itself.
     """
 
     first: int
     last: int
-    count: int
-    matrix: Floats
-    basis: Basis
+    matrix: Floats | None
+    basis: Basis | None
+
+    @property
+    def bytes(self) -> int:
+        """Memory it takes."""
+        if self.matrix is not None:
+            return self.matrix.nbytes
+        return self.basis.linear.nbytes + 4 * self.basis.weights.nbytes if self.basis is not None else 0
 
 
-_CACHE: dict[tuple[object, ...], Tables] = {}
+class _TableCache:
+    """The tables used last, up to a number of bytes in all."""
+
+    def __init__(self, most: int) -> None:
+        self.most, self.size = most, 0
+        self.tables: dict[tuple[object, ...], Tables] = {}
+        self.lock = threading.Lock()
+
+    def get(self, key: tuple[object, ...], make: Callable[[], Tables]) -> Tables:
+        """The tables of a key, made if need be; two threads may make the same ones, which are equal."""
+        with self.lock:
+            found = self.tables.pop(key, None)
+            if found is not None:
+                self.tables[key] = found
+                return found
+        made = make()
+        size = made.bytes
+        with self.lock:
+            if key not in self.tables:
+                self.tables[key] = made
+                self.size += size
+            while self.size > self.most:
+                self.size -= self.tables.pop(next(iter(self.tables))).bytes
+        return made
+
+
+_CACHE = _TableCache(96 << 20)
 
 
 def tables(form: Form, points: Floats, grid: tuple[int, int], count: int, orders: int) -> Iterator[Tables]:
@@ -112,25 +142,21 @@ def tables(form: Form, points: Floats, grid: tuple[int, int], count: int, orders
     ``grid`` (sides, level) names the sampling in the cache, ``count`` is the number of Chebyshev points.
     """
     for first in range(0, len(points), SAMPLES):
+        last = min(first + SAMPLES, len(points))
         key = (form.key, grid, count, orders, first)
-        found = _CACHE.get(key)
-        if found is None:
-            last = min(first + SAMPLES, len(points))
-            found = _make_tables(form.basis(points[first:last]), first, last, count, orders)
-            if found.matrix.size <= KEPT_TABLE:
-                if len(_CACHE) >= 64:
-                    _CACHE.pop(next(iter(_CACHE)), None)
-                _CACHE[key] = found
-        yield found
+        yield _CACHE.get(key, partial(_make_tables, form, points, first, last, count, orders))
 
 
-def _make_tables(basis: Basis, first: int, last: int, count: int, orders: int) -> Tables:
+def _make_tables(form: Form, points: Floats, first: int, last: int, count: int, orders: int) -> Tables:
+    basis = form.basis(points[first:last])
+    if not count:
+        return Tables(first, last, None, basis)
     samples, sides = basis.weights.shape[1:]
     linear = basis.linear[:orders]
     columns = linear.shape[2]
     table = np.empty((columns + sides * count, orders, samples))
     table[:columns] = linear.transpose(2, 0, 1)
-    if count and sides:
+    if sides:
         values, slopes = lagrange(count, basis.abscissae[0])
         weights, u = basis.weights[:orders, :, :, None], basis.abscissae[:orders, :, :, None]
         fields = np.empty((orders, samples, sides, count))
@@ -139,8 +165,7 @@ def _make_tables(basis: Basis, first: int, last: int, count: int, orders: int) -
         fields[..., 0] += basis.ends[:orders, ..., 0]
         fields[..., -1] += basis.ends[:orders, ..., 1]
         table[columns:] = fields.reshape(orders, samples, -1).transpose(2, 0, 1)
-    matrix = np.ascontiguousarray(table.reshape(len(table), -1))
-    return Tables(first, last, count, matrix, basis)
+    return Tables(first, last, np.ascontiguousarray(table.reshape(len(table), -1)), None)
 
 
 # --- patches ------------------------------------------------------------------------------------------------
@@ -232,7 +257,8 @@ def _cross_normals(a: Floats, b: Floats) -> tuple[Floats, tuple[Ints, Ints] | No
         normal[i] -= work
     square = np.einsum("cfs,cfs->fs", normal, normal, out=work)
     parallel: tuple[Ints, Ints] | None = None
-    if not square.min() > PARALLEL * square.max():  # also where anything is not a number
+    first = np.einsum("cf,cf->f", a[..., 0], a[..., 0]) * np.einsum("cf,cf->f", b[..., 0], b[..., 0])
+    if not (square.min(axis=1) > 1e4 * PARALLEL * first).all():  # a cheap sieve; also where anything is not a number
         speeds = np.einsum("cfs,cfs->fs", a, a) * np.einsum("cfs,cfs->fs", b, b)
         found = square <= PARALLEL * speeds
         if found.any():
@@ -270,6 +296,7 @@ def _evaluate_form(
     for begin in range(0, len(left), size):
         part = left[begin : begin + size]
         for block in tables(form, points, grid, 0, orders):
+            assert block.basis is not None
             values = exact_values(form.controls(rows[part]), block.basis, orders)
             yield (part, slice(block.first, block.last)), values
 
@@ -292,6 +319,7 @@ def _chunk(linear: Floats, nodes: Floats, part: Ints, size: int, block: Tables, 
     """One matrix product for a chunk, padded to its fixed size by its last patch."""
     padded = np.concatenate([part, np.repeat(part[-1:], size - len(part))])
     columns = linear.shape[2]
+    assert block.matrix is not None
     samples = block.last - block.first
     vectors = _work("vectors", (3, size, len(block.matrix)))
     vectors[..., :columns] = linear[:, padded]

@@ -84,14 +84,30 @@ def sector_normals(positions: Floats, offsets: Ints, vertices: Ints, area: Float
         largest = np.zeros_like(total)
         largest[sectors[order]] = of_corner[order]
         total[vanishing] = largest[vanishing]
-    return unit(total)[sectors]
+    result = unit(total)[sectors]
+    lost = np.flatnonzero(~result.any(axis=1))
+    if len(lost):
+        result[lost] = _any_normals(positions, offsets, vertices, sectors, lost)
+    return result
 
 
-def is_flat_shaded(normals: Floats, offsets: Ints, area: Floats) -> bool:
+def _any_normals(positions: Floats, offsets: Ints, vertices: Ints, sectors: Ints, corners: Ints) -> Floats:
+    """For corners in faces without area only: a unit vector across one side of their sector ``(k,3)``."""
+    points = positions[vertices]
+    along = unit(points[next_corners(offsets)] - points)
+    chosen = np.zeros_like(along)
+    chosen[sectors[corners[::-1]]] = along[corners[::-1]]
+    direction = chosen[sectors[corners]]
+    axis = np.eye(3)[np.abs(direction).argmin(axis=1)]
+    return unit(axis - dot(axis, direction) * direction)
+
+
+def is_flat_shaded(normals: Floats, offsets: Ints, area: Floats, links: tuple[Ints, Ints]) -> bool:
     """Whether given corner normals ``(C,3)`` only repeat the faces' own: a flat-shaded export.
 
     True when every face has one normal for all its corners, or every corner normal equals its face's, given by the
-    area vectors ``area (F,3)``, within half a degree.
+    area vectors ``area (F,3)``, within half a degree, and corners side by side at an edge, ``links``, never share
+    one where their faces differ (they do on a fine smooth mesh).
     """
     sizes = np.diff(offsets)
     first = np.repeat(normals[offsets[:-1]], sizes, axis=0)
@@ -99,4 +115,8 @@ def is_flat_shaded(normals: Floats, offsets: Ints, area: Floats) -> bool:
         return True
     own = np.repeat(area, sizes, axis=0)
     sized = own.any(axis=1)
-    return bool((degrees_between(normals[sized], own[sized]) <= FLAT_SHADED).all())
+    if bool((degrees_between(normals[sized], own[sized]) > FLAT_SHADED).any()):
+        return False
+    a, b = links
+    bent = degrees_between(own[a], own[b]) > SAME_NORMAL
+    return not bool((degrees_between(normals[a[bent]], normals[b[bent]]) <= SAME_NORMAL).any())

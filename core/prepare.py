@@ -20,6 +20,7 @@ from curvify.topology import (
     Topology,
     build_topology,
     clean_loops,
+    corner_links,
     fans,
     is_closed,
     signed_volume,
@@ -29,7 +30,7 @@ from curvify.topology import (
 WELD_MODES = ("auto", "always", "never")
 SHARP_SOURCES = ("auto", "normals", "none")
 #: Coordinates beyond this would overflow when they are multiplied.
-LARGEST_COORDINATE = 1e60
+LARGEST_COORDINATE = 1e30
 
 
 @dataclass(eq=False)
@@ -142,7 +143,7 @@ def _note_topology(coarse: Coarse, welded: int) -> None:
     counts["zero_area_faces"] = len(flat)
     if len(flat):
         warnings.append(
-            f"{count_of(len(flat), 'face')} without area, first: {loops.source_faces[flat[0]]}; refined flat"
+            f"{count_of(len(flat), 'face')} without area, first: {loops.source_faces[flat[0]]}; the surface there only follows its edges"
         )
     if is_closed(topology) and signed_volume(coarse.positions, loops.offsets, loops.vertices, coarse.area) < 0:
         warnings.append("the mesh is closed and inside out: its faces run clockwise seen from outside")
@@ -171,7 +172,7 @@ def _given_normals(coarse: Coarse, sharp_from: str) -> Floats | None:
     present = given.any(axis=1)
     if not present.any():
         return None
-    flat = present.all() and is_flat_shaded(given, loops.offsets, coarse.area)
+    flat = present.all() and is_flat_shaded(given, loops.offsets, coarse.area, corner_links(topology))
     if flat and sharp_from == "auto":
         if _normals_differ(topology, given):
             coarse.warnings.append(

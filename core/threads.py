@@ -17,11 +17,18 @@ Job = Callable[[Sink], None]
 Progress = Callable[[int, int], None]
 
 
+def processors() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 def run_jobs(
     jobs: list[tuple[int, Job]], sink: Sink, threads: int | None = None, progress: Progress | None = None
 ) -> None:
     """Run all jobs into a sink on some threads; the first error stops the others and is raised here."""
-    count = min(threads or len(os.sched_getaffinity(0)), len(jobs))
+    count = min(threads or processors(), len(jobs))
     total = sum(size for size, _ in jobs)
     state = _Run(sink, total, progress)
     if count <= 1:
@@ -46,8 +53,8 @@ def run_jobs(
                 worker.join(0.1)
     except BaseException as error:
         state.fail(error)
-        for worker in workers:
-            worker.join()
+        for worker in workers:  # one may hang in a pipe that nobody reads
+            worker.join(None if sink.anywhere else 1.0)
         raise
     if state.error is not None:
         raise state.error

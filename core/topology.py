@@ -107,7 +107,8 @@ def weld_vertices(positions: Floats, offsets: Ints, vertices: Ints, mode: str) -
 
     ``always`` merges all bit-equal positions. ``auto`` merges the ends of two open half-edges that have
     bit-equal end positions and run in opposite directions, when there are just two such. ``never`` keeps
-    the file's topology. The ends of an edge without length are one point in every mode.
+    the file's topology. The ends of an edge without length, and corners of one face at one place, are one point in
+    every mode.
     """
     count = len(positions)
     if mode == "always":
@@ -117,11 +118,25 @@ def weld_vertices(positions: Floats, offsets: Ints, vertices: Ints, mode: str) -
         return first[classes]
     heads = vertices[next_corners(offsets)]
     short = (positions[vertices] == positions[heads]).all(axis=1) & (vertices != heads)
-    links = [np.stack([vertices[short], heads[short]])]
+    links = [np.stack([vertices[short], heads[short]]), *_pinches(positions, offsets, vertices)]
     if mode == "auto":
         links += _stitches(positions, vertices, heads)
     a, b = np.concatenate(links, axis=1)
     return components(count, a, b)
+
+
+def _pinches(positions: Floats, offsets: Ints, vertices: Ints) -> list[Ints]:
+    """Vertex pairs ``(2,k)`` at one place in one face: where an outline touches itself. Takes 5 corners at least."""
+    sizes = np.diff(offsets)
+    corners = np.flatnonzero(np.repeat(sizes > 4, sizes))
+    if not len(corners):
+        return []
+    face = np.repeat(np.arange(len(sizes)), sizes)[corners]
+    place = position_classes(positions[vertices[corners]])
+    order = np.lexsort((place, face))
+    same = (face[order][1:] == face[order][:-1]) & (place[order][1:] == place[order][:-1])
+    one, other = vertices[corners[order[:-1][same]]], vertices[corners[order[1:][same]]]
+    return [np.stack([one, other])]
 
 
 def _stitches(positions: Floats, tails: Ints, heads: Ints) -> list[Ints]:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -117,7 +119,7 @@ def make_side(p: Vector, q: Vector, n_p: Vector, n_q: Vector, circle: bool) -> S
         length = np.sqrt(dot(e, e))
         ends.append(t * (2 * length / (1 + dot(t, e) / length) if circle else length))
     points = [p, p + ends[0] / 3, q - ends[1] / 3, q]
-    hodograph = [3 * (b - a) for a, b in zip(points, points[1:], strict=False)]
+    hodograph = [3 * (b - a) for a, b in pairwise(points)]
 
     def field(t: complex) -> Vector:
         return np.cross(bezier(hodograph, t), np.cross((1 - t) * n_p + t * n_q, e))
@@ -144,6 +146,7 @@ class Patch:
 
     def __init__(self, points: npt.NDArray[np.float64], normals: npt.NDArray[np.float64], kind: str) -> None:
         self.n, self.kind = len(points), kind
+        self._at_center: Vector | None = None
         n = self.n
         self.p = [np.asarray(point, dtype=complex) for point in points]
         self.normals = [np.asarray(normal, dtype=complex) for normal in normals]
@@ -214,16 +217,15 @@ class Patch:
         plain = gregory(self.n, self.p, curves, tangents, place)
         if self.kind != "precise" or not corrected:
             return plain
-        origin = np.zeros(2, dtype=complex)
-        at_center = gregory(self.n, self.p, curves, tangents, origin) + self._correction(origin)
-        return plain + self._correction(place) + self._bump(place) * (self.center() - at_center)
+        if self._at_center is None:
+            origin = np.zeros(2, dtype=complex)
+            self._at_center = gregory(self.n, self.p, curves, tangents, origin) + self._correction(origin)
+        return plain + self._correction(place) + self._bump(place) * (self.center() - self._at_center)
 
-    def derivatives(self, x: npt.ArrayLike, corrected: bool = True) -> tuple[Vector, Vector]:
-        place = np.asarray(x, dtype=complex)
-        by_xi, by_eta = (
-            self(place + 1j * STEP * axis, corrected).imag / STEP for axis in (np.array([1, 0]), np.array([0, 1]))
-        )
-        return by_xi, by_eta
+    def jet(self, x: npt.ArrayLike, corrected: bool = True) -> npt.NDArray[np.float64]:
+        """Value, derivative by xi and derivative by eta ``(3,3)``."""
+        by_xi, by_eta = (self(np.asarray(x) + 1j * STEP * axis, corrected) for axis in np.eye(2))
+        return np.array([by_xi.real, by_xi.imag / STEP, by_eta.imag / STEP])
 
     def center(self) -> Vector:
         p, normals = np.array(self.p), np.array(self.normals)
@@ -247,7 +249,7 @@ class Patch:
             return np.zeros(3, dtype=complex)
         degree = 4 if n in (5, 6) else 3
         exponents = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
-        missing = np.array([self._defect(i, j, x) for i, j in exponents])
+        missing = np.array([defect(n, i, j, x[0], x[1]) for i, j in exponents])
         rows = np.array([monomial_data(n, i, j) for i, j in exponents]).T
         fit = np.linalg.pinv(rows, rcond=1e-9)
         sides, p = self.sides, self.p
@@ -259,26 +261,30 @@ class Patch:
         ]
         return (missing @ fit) @ np.array(data)
 
-    def _defect(self, i: int, j: int, x: Vector) -> complex:
-        n, c = self.n, corners(self.n)
 
-        def value(y: Vector) -> Vector:
-            return np.array([y[0] ** i * y[1] ** j])
+@cache
+def defect(n: int, i: int, j: int, xi: complex, eta: complex) -> complex:
+    """A monomial minus the plain patch through its own side data."""
+    c = corners(n)
 
-        def curve(k: int) -> Field:
-            return lambda t: value((1 - t) * c[k] + t * c[(k + 1) % n])
+    def value(y: Vector) -> Vector:
+        return np.array([y[0] ** i * y[1] ** j])
 
-        def tangent(k: int) -> Field:
-            def at(t: complex) -> Vector:
-                y = (1 - t) * c[k] + t * c[(k + 1) % n]
-                along = (1 - t) * (c[k - 1] - c[k]) + t * (c[(k + 2) % n] - c[(k + 1) % n])
-                return speed(n, t) * (gradient(i, j, y) * along).sum()[None]
+    def curve(k: int) -> Field:
+        return lambda t: value((1 - t) * c[k] + t * c[(k + 1) % n])
 
-            return at
+    def tangent(k: int) -> Field:
+        def at(t: complex) -> Vector:
+            y = (1 - t) * c[k] + t * c[(k + 1) % n]
+            along = (1 - t) * (c[k - 1] - c[k]) + t * (c[(k + 2) % n] - c[(k + 1) % n])
+            return speed(n, t) * (gradient(i, j, y) * along).sum()[None]
 
-        p = [value(point.astype(complex)) for point in c]
-        plain = gregory(n, p, [curve(k) for k in range(n)], [tangent(k) for k in range(n)], x)
-        return complex((value(x) - plain)[0])
+        return at
+
+    p = [value(point.astype(complex)) for point in c]
+    x = np.array([xi, eta])
+    plain = gregory(n, p, [curve(k) for k in range(n)], [tangent(k) for k in range(n)], x)
+    return complex((value(x) - plain)[0])
 
 
 def gradient(i: int, j: int, y: Vector) -> Vector:

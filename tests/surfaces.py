@@ -8,7 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+import curvify
 from curvify.mesh import DenseMesh, PolygonMesh
+from curvify.schemes.base import Patches
 
 Array = npt.NDArray[np.float64]
 Faces = list[list[int]]
@@ -71,8 +73,8 @@ def around_vertices(mesh: PolygonMesh) -> Faces:
     """Ids of the faces around each vertex of a closed mesh, counter-clockwise."""
     after: dict[tuple[int, int], tuple[int, int]] = {}
     for f, face in enumerate(mesh.faces()):
-        for before, vertex, following in zip(face[-1:] + face[:-1], face, face[1:] + face[:1], strict=True):
-            after[(vertex, following)] = (f, before)
+        for i, vertex in enumerate(face):
+            after[(vertex, face[(i + 1) % len(face)])] = (f, face[i - 1])
     result = []
     for vertex in range(mesh.vertex_count):
         start = edge = next(e for e in after if e[0] == vertex)
@@ -194,9 +196,7 @@ def mixed_ball() -> PolygonMesh:
     for f, face in enumerate(base.faces()):
         if len(face) == 6 and f % 3 == 0:
             faces += [face[:4], [face[0], face[3], face[4], face[5]]]
-        elif len(face) == 6 and f % 3 == 1:
-            faces += [face[:3], [face[0], *face[2:]]]
-        elif len(face) == 5 and f % 2 == 0:
+        elif (len(face) == 6 and f % 3 == 1) or (len(face) == 5 and f % 2 == 0):
             faces += [face[:3], [face[0], *face[2:]]]
         else:
             faces.append(face)
@@ -209,7 +209,15 @@ def prism(sides: int, height: float = 1.0, radius: float = 1.0) -> PolygonMesh:
     ring = radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     faces = grid_faces(sides, 1, (True, False))
     faces += [list(range(sides))[::-1], list(range(sides, 2 * sides))]
-    return PolygonMesh.from_faces(np.concatenate([ring, ring + [0, 0, height]]), faces)
+    return PolygonMesh.from_faces(np.concatenate([ring, ring + np.array([0, 0, height])]), faces)
+
+
+def l_prism() -> PolygonMesh:
+    """A solid with two concave hexagons."""
+    ring = np.array([[0.0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]])
+    points = np.concatenate([np.column_stack([ring, np.full(6, z)]) for z in (0.0, 1.0)])
+    faces = [[i, (i + 1) % 6, (i + 1) % 6 + 6, i + 6] for i in range(6)]
+    return PolygonMesh.from_faces(points, [*faces, [5, 4, 3, 2, 1, 0], [6, 7, 8, 9, 10, 11]])
 
 
 # --- changes --------------------------------------------------------------------------------------------------
@@ -282,7 +290,32 @@ def side_points(sides: int, side: int, t: npt.ArrayLike) -> Array:
     return (1 - fraction) * corners[side] + fraction * corners[(side + 1) % sides]
 
 
-# --- what dense meshes are ------------------------------------------------------------------------------------
+# --- patches ---------------------------------------------------------------------------------------------------
+
+
+def half_edge_polynomials(patches: Patches, corners: npt.ArrayLike) -> tuple[Array, Array]:
+    """Bezier points ``(m,4,3)`` of the curve and of the normal field of half-edges, in their own direction."""
+    ids = np.asarray(corners, dtype=np.int64)
+    curves = np.moveaxis(patches.curves, 0, -1)[patches.topology.edge[ids]]
+    fields = np.moveaxis(patches.fields, 0, -1)[patches.side_field[ids]]
+    backward = ~patches.topology.forward[ids]
+    for points in (curves, fields):
+        points[backward] = points[backward][:, ::-1]
+    return curves, fields
+
+
+def bezier(points: Array, t: npt.ArrayLike) -> Array:
+    """Cubic Bezier polynomials ``(...,4,3)`` at ``t (m,)``: ``(...,m,3)``."""
+    s = np.asarray(t, dtype=float)
+    return np.stack([(1 - s) ** 3, 3 * s * (1 - s) ** 2, 3 * s**2 * (1 - s), s**3], axis=-1) @ points
+
+
+# --- dense meshes ------------------------------------------------------------------------------------
+
+
+def refined(mesh: PolygonMesh, level: int = 2, dtype: object = np.float64, **options: object) -> DenseMesh:
+    """The dense mesh of the default scheme."""
+    return curvify.surface(mesh, **options).refine(level, dtype)
 
 
 def directed_edges(faces: npt.NDArray[np.integer]) -> Counter[tuple[int, int]]:

@@ -15,7 +15,6 @@ import numpy as np
 
 from curvify.mesh import Bools, Floats
 from curvify.schemes.base import bernstein, bernstein_slope
-from curvify.schemes.gregory_basis import side_speed
 
 #: Weight of the smooth step in the blend of ``smooth``.
 SMOOTH_STEP = 0.75
@@ -49,7 +48,7 @@ class ProjectedBlend:
     """T = f(t) (1 + K b(t)) Y, Y the part across n_c of h(t) T(0) + (1 - h(t)) T(1).
 
     ``precise``: f = s_n, b = 4t(1-t), h = 1-t. ``smooth``: f = 1, b = 16 t^2 (1-t)^2, h a smoother step.
-    ``gains (f,n)`` is K.
+    ``gains (f,n)`` is K. The side field is T/f: f is the same for all faces, and stands in the basis.
     """
 
     sides: Sides
@@ -73,18 +72,15 @@ class ProjectedBlend:
         return project_with_slope(start * h + end * (1 - h), (start - end) * h_slope, normal, normal_slope)
 
     def fields(self, t: Floats) -> Floats:
-        """T at ``t (m,)`` or ``(n,m)``: ``(3,f,n,m)``."""
+        """T/f at ``t (m,)`` or ``(n,m)``: ``(3,f,n,m)``."""
         y = self.blend(t)
-        y *= self._factor(t)[0]
+        y *= self._fullness(t)[0]
         return y
 
     def field_derivatives(self, t: Floats) -> tuple[Floats, Floats]:
-        """T and T' at ``t``."""
-        return self.scaled(t, *self.blend_with_slope(t))
-
-    def scaled(self, t: Floats, y: Floats, y_slope: Floats) -> tuple[Floats, Floats]:
-        """T and T' at ``t`` from Y and Y' there."""
-        factor, slope = self._factor(t)
+        """T/f and its derivative at ``t``."""
+        y, y_slope = self.blend_with_slope(t)
+        factor, slope = self._fullness(t)
         return factor * y, slope * y + factor * y_slope
 
     def inward(self, t: Floats) -> Floats:
@@ -99,13 +95,12 @@ class ProjectedBlend:
         lam = SMOOTH_STEP
         return (1 - t) * ((1 - lam) + lam * (1 - t) * (1 + 2 * t)), -(1 - lam) - 6 * lam * t * (1 - t)
 
-    def _factor(self, t: Floats) -> tuple[Floats, Floats]:
-        """F (1 + K b) and its derivative."""
+    def _fullness(self, t: Floats) -> tuple[Floats, Floats]:
+        """1 + K b and its derivative."""
         b, b_slope = 4 * t * (1 - t), 4 - 8 * t
         gain = self.gains[..., None]
         if self.kind == "precise":
-            f, f_slope = side_speed(self.gains.shape[1], t)
-            return f * (1 + gain * b), f_slope * (1 + gain * b) + f * gain * b_slope
+            return 1 + gain * b, gain * b_slope
         return 1 + gain * b**2, gain * 2 * b * b_slope
 
 

@@ -126,12 +126,15 @@ class GregoryControls:
         """Controls of the patches with the given corners ``(f,n)``."""
         n = corners.shape[1]
         points, tangent, target = cross_tangents(work, corners, options)
-        value, slope = tangent.field_derivatives(np.array([0.0, 0.5, 1.0]))
+        t = np.array([0.0, 0.5, 1.0])
+        value, slope = tangent.field_derivatives(t)
         curves = tangent.sides.curves
         corrected = target is not None
+        if corrected:
+            slope = slope + value * side_speed(n, t)[1]  # T' = s F' + s' F, and s = 1 at the ends
         blocks = [points, curves[..., 1], curves[..., 2], slope[..., 0], slope[..., 2]]
         if corrected and n != 4:
-            blocks.append(value[..., 1] / side_speed(n, np.array([0.5]))[0])
+            blocks.append(value[..., 1])
         linear = np.zeros((3, len(corners), n * len(blocks) + corrected))
         for i, block in enumerate(blocks):
             linear[..., n * i : n * (i + 1)] = block

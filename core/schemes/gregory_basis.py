@@ -4,7 +4,8 @@ Source: Leung, Wang, Zhang, equations (1), (3), (4) (J. Gregory's corner interpo
 combination per face; the polynomial correction and the center function are ours (docs/mathematics.md).
 Per side k of a face the control vectors are, in this order, the Bezier points p_k, Q0_k, Q1_k of its edge and the
 derivative of the cross tangent at its two ends, T'_k(0), T'_k(1); then, for the corrected patch, T_k(1/2)/s(1/2)
-(n != 4) and one vector that moves the center. The cross tangents are the side fields.
+(n != 4) and one vector that moves the center. The cross tangents are the side fields, for the corrected patch over
+s_n, which stands in their weights.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ def gregory_basis(sides: int, points: Floats, corrected: bool) -> Basis:
     blocks = _plain_columns(domain)
     weights = _field_weights(domain)
     if corrected:
+        weights = jet_product(weights, jet_compose(*side_speed(sides, domain.u[0]), domain.u))
         if sides != 4:
             p, tau0, tau1, middle = _correction(sides, points, domain)
             blocks[0] += p - 3 * tau0 + 3 * np.roll(tau1, 1, axis=1)

@@ -65,7 +65,7 @@ class Surface:
         normal = cross(by_xi, by_eta)
         square = (normal**2).sum(axis=1)
         speeds = (by_xi**2).sum(axis=1) * (by_eta**2).sum(axis=1)
-        parallel = square <= 1e-20 * speeds
+        parallel = square <= evaluate.PARALLEL * speeds
         normal /= np.sqrt(np.where(parallel, 1.0, square))[:, None]
         normal[parallel] = evaluate.blended_normals(self.patches, ids[parallel], places[parallel])
         return position, normal

@@ -1,0 +1,127 @@
+"""The two ends of a command, IN and OUT: their formats and names, checked before any work is done."""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO, cast
+
+from curvify.errors import CurvifyError, FormatError, OptionError
+from curvify.formats import READ_FORMATS, WRITE_FORMATS, find_format, read_mesh
+from curvify.mesh import PolygonMesh
+
+STREAM = "-"
+#: Formats that hold polygons; the others are written as triangles.
+POLYGON_FORMATS = ("obj", "ply", "off")
+
+
+def shown_name(path: str, stream: str) -> str:
+    """The name of a file in messages; ``stream`` for ``-``."""
+    return stream if path == STREAM else path
+
+
+def check_input(path: str, format: str | None) -> None:
+    """Raise CurvifyError unless IN has a format that can be read, so far as its name tells."""
+    if path != STREAM or format is not None:
+        with hint("--input-format", format):
+            find_format(path, format, READ_FORMATS)
+    if path == STREAM and sys.stdin is None:
+        raise FormatError("standard input is closed")
+
+
+def check_output(path: str, format: str | None, no_clobber: bool = False) -> str:
+    """The format of OUT. Raises CurvifyError where it cannot be written, so far as that is known before the work."""
+    if path == STREAM:
+        if format is None:
+            raise OptionError("standard output needs --output-format, for example --output-format ply")
+        if sys.stdout is None:
+            raise FormatError("standard output is closed")
+    with hint("--output-format", format):
+        chosen = find_format(path, format, WRITE_FORMATS)
+    if path == STREAM:
+        return chosen
+    check_folder(path)
+    if no_clobber and os.path.lexists(path):
+        raise FormatError(f"{path}: it exists already; leave out --no-clobber to replace it")
+    return chosen
+
+
+def check_folder(path: str) -> None:
+    """Raise FormatError where a file cannot be put."""
+    if Path(path).is_dir():
+        raise FormatError(f"{path}: cannot write: it is a folder; give the name of a file")
+    if not Path(path).parent.is_dir():
+        raise FormatError(f"{path}: cannot write: its folder does not exist; make it first")
+
+
+def read_input(path: str, format: str | None) -> PolygonMesh:
+    """The mesh of IN."""
+    if path == STREAM and format is None:
+        with hint("--input-format", format):
+            return read_mesh(path)
+    return read_mesh(path, format)
+
+
+@contextmanager
+def hint(option: str, given: str | None) -> Iterator[None]:
+    """Name the option that tells a format, where a format that was not given is not known."""
+    try:
+        yield
+    except FormatError as error:
+        text = str(error)
+        if given is None and "one of" in text:
+            raise FormatError(f"{text} (with {option})") from None
+        raise
+
+
+@contextmanager
+def naming(name: str, *kinds: type[CurvifyError]) -> Iterator[None]:
+    """Put the name of the file before errors of these kinds that do not have it."""
+    try:
+        yield
+    except kinds as error:
+        text = str(error)
+        if text.startswith((f"{name}:", f"{name!r}:")):
+            raise
+        raise type(error)(f"{name}: {text}") from None
+
+
+class CountedStdout(io.BufferedIOBase):
+    """Standard output that knows how many bytes went there."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def writable(self) -> bool:
+        """Always."""
+        return True
+
+    def write(self, data: Any, /) -> int:
+        """Write bytes."""
+        with memoryview(data) as view:
+            self.count += view.nbytes
+        with _naming_stdout():
+            return sys.stdout.buffer.write(data)
+
+    def flush(self) -> None:
+        """Hand on what is buffered."""
+        with _naming_stdout():
+            sys.stdout.buffer.flush()
+
+    def as_file(self) -> BinaryIO:
+        """Itself, as the type that writers ask for."""
+        return cast(BinaryIO, self)
+
+
+@contextmanager
+def _naming_stdout() -> Iterator[None]:
+    """Say where an error of the operating system happened."""
+    try:
+        yield
+    except OSError as error:
+        error.filename = "stdout"
+        raise

@@ -1,0 +1,169 @@
+"""Every option that a command may have, once, as a decorator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+from curvify.cli.group import Option
+from curvify.schemes import NAMES
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+SURFACE, SHARP, MESH, OUTPUT, RUNNING, MESSAGES = (
+    "Surface",
+    "Sharp features",
+    "Input mesh",
+    "Output",
+    "Running",
+    "Messages",
+)
+POSITIVE = click.IntRange(min=1)
+
+
+def option(heading: str, *names: str, **attributes: Any) -> Callable[[Function], Function]:
+    """An option under a heading of the help."""
+    return click.option(*names, cls=Option, heading=heading, **attributes)
+
+
+def with_options(*decorators: Callable[[Any], Any]) -> Callable[[Function], Function]:
+    """Several options, in the order of the help."""
+
+    def decorate(function: Function) -> Function:
+        for decorator in reversed(decorators):
+            function = decorator(function)
+        return function
+
+    return decorate
+
+
+in_and_out = with_options(
+    click.argument("input", metavar="IN", type=click.Path(allow_dash=True)),
+    click.argument("output", metavar="OUT", type=click.Path(allow_dash=True)),
+)
+
+# --- surface ----------------------------------------------------------------------------------------------------
+
+scheme = option(
+    SURFACE,
+    "--scheme",
+    type=click.Choice(NAMES),
+    default=NAMES[0],
+    show_default=True,
+    help="How the surface is made; 'curvify schemes' explains.",
+)
+level = option(
+    SURFACE,
+    "-k",
+    "--level",
+    type=POSITIVE,
+    default=5,
+    show_default=True,
+    help="Every edge becomes 2 K segments, a polygon with n sides n K^2 quads.",
+    metavar="K",
+)
+cross_tangent = option(
+    SURFACE,
+    "--cross-tangent",
+    type=click.Choice(["precise", "smooth", "linear", "quadratic"]),
+    help="How fast the surface leaves the edges: 'precise' for accuracy, 'smooth' for even reflections, the others as "
+    "in the paper.  [default: precise]",
+)
+alpha = option(SURFACE, "--alpha", type=float, metavar="A", help="Fullness of 'quadratic', above 0.  [default: 1]")
+normals = option(
+    SURFACE,
+    "--normals",
+    type=click.Choice(["exact", "paper"]),
+    help="Normals of the surface itself, or the paper's approximation.  [default: exact]",
+)
+
+# --- input ------------------------------------------------------------------------------------------------------
+
+sharp_from = option(
+    SHARP,
+    "--sharp-from",
+    type=click.Choice(["auto", "normals", "none"]),
+    help="What makes an edge sharp: normals of the file that differ across it, unless they only repeat flat faces "
+    "(auto); the same in any case (normals); nothing (none).  [default: auto]",
+)
+weld = option(
+    MESH,
+    "--weld",
+    type=click.Choice(["auto", "always", "never"]),
+    help="Close seams between open edges that coincide (auto), merge all equal positions (always), or neither.  "
+    "[default: auto]",
+)
+split_rule = option(
+    MESH,
+    "--split-rule",
+    type=click.Choice(["best", "closest"]),
+    help="How concave faces are cut: few well-shaped pieces, or the paper's rule.  [default: best]",
+)
+max_sides = option(
+    MESH,
+    "--max-sides",
+    type=click.IntRange(min=3),
+    default=64,
+    show_default=True,
+    metavar="N",
+    help="Cut faces with more sides than this.",
+)
+input_format = option(
+    MESH, "--input-format", metavar="NAME", help="Format of IN where its suffix does not tell: obj, ply, off, stl, ..."
+)
+
+# --- output -----------------------------------------------------------------------------------------------------
+
+output_format = option(
+    OUTPUT, "--output-format", metavar="NAME", help="Format of OUT where its suffix does not tell, as for '-'."
+)
+triangulate = option(OUTPUT, "--triangulate", is_flag=True, help="Write triangles instead of quads.")
+precision = option(
+    OUTPUT,
+    "--precision",
+    type=click.Choice(["input", "float32", "float64"]),
+    default="input",
+    show_default=True,
+    help="Type of the numbers in OUT; 'input' is that of a PLY file, float32 for others.",
+)
+as_text = option(OUTPUT, "--ascii", "ascii", is_flag=True, help="Write PLY as text.")
+no_clobber = option(OUTPUT, "--no-clobber", is_flag=True, help="Fail if OUT exists already.")
+report = option(
+    OUTPUT, "--report", metavar="FILE", help="Write measurements of the surface and the run as JSON; '-' for stdout."
+)
+
+# --- running ----------------------------------------------------------------------------------------------------
+
+backend = option(
+    RUNNING,
+    "--backend",
+    type=click.Choice(["auto", "cpu", "gpu"]),
+    default="auto",
+    show_default=True,
+    help="What evaluates the surface; this version has the CPU only.",
+)
+threads = option(
+    RUNNING,
+    "--threads",
+    type=POSITIVE,
+    metavar="N",
+    help="Threads to use; the result does not depend on it.  [default: one per processor]",
+)
+max_faces = option(
+    RUNNING,
+    "--max-faces",
+    type=POSITIVE,
+    default=50_000_000,
+    show_default=True,
+    metavar="N",
+    help="Refuse to make more faces than this.",
+)
+dry_run = option(RUNNING, "--dry-run", is_flag=True, help="Say how large OUT would be and stop.")
+
+# --- messages ---------------------------------------------------------------------------------------------------
+
+quiet = option(MESSAGES, "-q", "--quiet", is_flag=True, help="No warnings and no progress bar, only errors.")
+verbose = option(MESSAGES, "-v", "--verbose", is_flag=True, help="Explain what was done and how long it took.")
+messages = with_options(quiet, verbose)

@@ -1,0 +1,243 @@
+"""Running `refine`: read, prepare, evaluate into the output, report; each stage timed."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from curvify.cli import files
+from curvify.cli.console import Console, count, size
+from curvify.cli.predict import predicted_bytes, predicted_faces
+from curvify.cli.report import Recorder, refine_report, write_report
+from curvify.errors import FormatError, LimitError, MeshError, OptionError
+from curvify.formats.dense import dense_output
+from curvify.jobs import dense_layout
+from curvify.mesh import PolygonMesh
+from curvify.refinement import Surface, surface
+from curvify.schemes import load_scheme
+from curvify.sinks import DenseLayout
+from curvify.weld import number_dense_mesh
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the command line asks for; None where the scheme's own default holds."""
+
+    input: str
+    output: str
+    scheme: str
+    level: int
+    cross_tangent: str | None
+    alpha: float | None
+    normals: str | None
+    sharp_from: str | None
+    weld: str | None
+    split_rule: str | None
+    input_format: str | None
+    output_format: str | None
+    triangulate: bool
+    precision: str
+    ascii: bool
+    no_clobber: bool
+    report: str | None
+    backend: str
+    threads: int | None
+    max_faces: int
+    dry_run: bool
+    quiet: bool
+    verbose: bool
+
+    @property
+    def scheme_options(self) -> dict[str, Any]:
+        """The scheme's options that were given."""
+        names = ("cross_tangent", "alpha", "normals", "sharp_from", "weld", "split_rule")
+        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+
+    @property
+    def source(self) -> str:
+        """IN in messages."""
+        return files.shown_name(self.input, "stdin")
+
+    @property
+    def target(self) -> str:
+        """OUT in messages."""
+        return files.shown_name(self.output, "stdout")
+
+    def dtype(self, mesh: PolygonMesh) -> np.dtype[Any]:
+        """Type of the numbers in OUT."""
+        return np.dtype(mesh.position_dtype if self.precision == "input" else self.precision)
+
+
+@dataclass
+class Run:
+    """What is known of a run by the time of its report."""
+
+    request: Request
+    options: Any
+    threads: int
+    mesh: PolygonMesh
+    surface: Surface
+    dtype: np.dtype[Any]
+    format: str
+    warnings: list[str]
+    seconds: dict[str, float] = field(default_factory=dict)
+    bytes: int | None = None
+
+    @property
+    def triangulate(self) -> bool:
+        """Whether triangles are written: on request, and in formats that have nothing else."""
+        return self.request.triangulate or self.format not in files.POLYGON_FORMATS
+
+    @property
+    def faces(self) -> int:
+        """Faces that will be written."""
+        return predicted_faces(self.surface, self.request.level, self.triangulate)
+
+    @property
+    def all_options(self) -> dict[str, Any]:
+        """Every option in effect, the scheme's and the output's."""
+        request = self.request
+        return {
+            **asdict(self.options),
+            "precision": self.dtype.name,
+            "triangulate": self.triangulate,
+            "ascii": request.ascii,
+            "max_faces": request.max_faces,
+        }
+
+
+def refine_file(request: Request) -> None:
+    """Do what the command line asks for. Raises CurvifyError."""
+    console = Console(request.quiet, request.verbose)
+    options, format = check(request)
+    seconds: dict[str, float] = {}
+    with timed(seconds, "read"):
+        mesh = files.read_input(request.input, request.input_format)
+    with timed(seconds, "prepare"), files.naming(request.source, MeshError):
+        made = surface(mesh, request.scheme, **request.scheme_options)
+    warnings = [f"{request.source}: {text}" for text in made.warnings]
+    for text in warnings:
+        console.warn(text)
+    threads = request.threads or available_processors()
+    run = Run(request, options, threads, mesh, made, request.dtype(mesh), format, warnings, seconds)
+    _check_limit(run)
+    if request.dry_run:
+        _tell_prediction(run, console)
+    else:
+        _refine(run, console)
+
+
+def check(request: Request) -> tuple[Any, str]:
+    """The scheme's options and the format of OUT. Raises CurvifyError for what can be seen to fail beforehand."""
+    if request.backend == "gpu":
+        raise OptionError("this version has no GPU backend yet; leave out --backend or choose cpu")
+    options = load_scheme(request.scheme).Options(**request.scheme_options)
+    format = files.check_output(request.output, request.output_format, request.no_clobber)
+    if request.ascii and format != "ply":
+        raise OptionError(f"--ascii is for PLY; {format} has no such choice")
+    files.check_input(request.input, request.input_format)
+    if request.report is not None:
+        _check_report(request, request.report)
+    return options, format
+
+
+def _check_report(request: Request, report: str) -> None:
+    if request.dry_run:
+        raise OptionError("--dry-run measures nothing that --report could tell; leave one of them out")
+    if report == files.STREAM and request.output == files.STREAM:
+        raise OptionError("OUT and --report cannot both be standard output")
+    if report != files.STREAM:
+        files.check_folder(report)
+        if request.output != files.STREAM and Path(report).resolve() == Path(request.output).resolve():
+            raise OptionError(f"{report}: OUT and --report cannot be the same file")
+
+
+def available_processors() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@contextmanager
+def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    """Note how long a stage took."""
+    start = time.perf_counter()
+    yield
+    seconds[stage] = round(time.perf_counter() - start, 6)
+
+
+def _check_limit(run: Run) -> None:
+    """Refuse more faces than allowed, counted as they will be written."""
+    request = run.request
+    if run.faces > request.max_faces:
+        raise LimitError(
+            f"{request.source}: level {request.level} gives {run.faces:,} faces, more than the limit of "
+            f"{request.max_faces:,}; choose a lower level or raise --max-faces"
+        )
+
+
+def _tell_prediction(run: Run, console: Console) -> None:
+    request, patches = run.request, run.surface.patches
+    layout = dense_layout(patches, number_dense_mesh(patches, request.level), run.dtype)
+    bytes_ = predicted_bytes(layout, run.format, request.ascii, run.triangulate)
+    console.tell(f"{request.source}: {_sizes(patches.counts)}")
+    console.tell(f"{request.target} would have {_dense_sizes(run, layout)}, about {size(bytes_)}")
+
+
+def _refine(run: Run, console: Console) -> None:
+    request = run.request
+    options = ", ".join(f"{name} {value}" for name, value in asdict(run.options).items())
+    console.explain(f"{request.source}: {_sizes(run.surface.patches.counts)}")
+    console.explain(f"scheme {request.scheme}, level {request.level}, {options}, {run.dtype.name}")
+    console.explain(f"backend cpu, {count(run.threads, 'thread')}")
+    recorder = Recorder(run.surface.patches) if request.report is not None else None
+    with timed(run.seconds, "evaluate_and_write"):
+        layout = _write(run, recorder, console)
+    console.explain(f"{request.target}: {_dense_sizes(run, layout)}" + (f", {size(run.bytes)}" if run.bytes else ""))
+    console.explain(", ".join(f"{stage.replace('_', ' ')} {took:.3f} s" for stage, took in run.seconds.items()))
+    if request.report is not None and recorder is not None:
+        write_report(request.report, refine_report(run, layout, recorder))
+
+
+def _write(run: Run, recorder: Recorder | None, console: Console) -> DenseLayout:
+    """Evaluate the surface into OUT."""
+    request = run.request
+    stdout = files.CountedStdout()
+    with (
+        files.naming(request.target, FormatError),
+        dense_output(
+            request.output,
+            run.format,
+            ascii=request.ascii,
+            triangulate=run.triangulate,
+            stdout=stdout.as_file(),
+        ) as sink,
+        console.progress(request.target) as progress,
+    ):
+        if recorder is not None:
+            sink = recorder.into(sink)
+        layout = run.surface.stream(
+            sink, request.level, run.dtype, threads=run.threads, max_faces=request.max_faces, progress=progress
+        )
+    if request.output == files.STREAM:
+        run.bytes = stdout.count
+    elif Path(request.output).is_file():
+        run.bytes = Path(request.output).stat().st_size
+    return layout
+
+
+def _sizes(counts: dict[str, int]) -> str:
+    return f"{count(counts['vertices'], 'vertex', 'vertices')}, {count(counts['faces'], 'face')}"
+
+
+def _dense_sizes(run: Run, layout: DenseLayout) -> str:
+    repeats = f" and {count(len(layout.repeats), 'repeat')} of them" if len(layout.repeats) else ""
+    return f"{count(layout.vertex_count, 'vertex', 'vertices')}{repeats}, {count(run.faces, 'face')}"

@@ -1,0 +1,138 @@
+"""What only shows in a process of its own: imports, signals, pipes, closed streams."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from click import __file__ as click_file
+
+CURVIFY = [sys.executable, "-c", "from curvify.cli.main import main; main()"]
+LONG = ["-k", "400"]  # minutes
+
+
+def imported(*args: str) -> set[str]:
+    """Modules that a command line imports."""
+    code = f"""
+import atexit, sys
+atexit.register(lambda: print(*sorted(sys.modules), file=sys.__stderr__))
+sys.argv = ["curvify", *{list(args)!r}]
+from curvify.cli.main import main
+main()
+"""
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, timeout=60, check=True)
+    return set(ended.stderr.decode().split())
+
+
+def test_version_imports_nothing_but_itself(process):
+    result = process("--version")
+    assert (result.code, result.err) == (0, "")
+    assert result.out == b"curvify 0.1.0\n"
+    assert not imported("--version") & {"click", "numpy", "curvify.cli.group"}
+
+
+@pytest.mark.parametrize("args", [["--help"], ["refine", "--help"], ["split", "-h"], ["schemes", "-h"]])
+def test_help_imports_click_only(args):
+    assert Path(click_file).exists()
+    found = imported(*args)
+    assert "click" in found
+    assert not found & {"numpy", "tqdm", "trimesh", "curvify.mesh"}
+
+
+def test_help_of_the_group_imports_no_command():
+    assert not imported("--help") & {"curvify.cli.refine", "curvify.cli.split", "curvify.cli.options"}
+
+
+def test_refine_imports_what_it_needs(folder):
+    for name in ("dense.ply", "dense.obj"):
+        found = imported("refine", "cube.obj", name)
+        assert "numpy" in found
+        heavy = {"trimesh", "scipy", "numba", "moderngl", "pymeshlab", "tqdm", "networkx", "curvify.gpu"}
+        assert not found & heavy
+
+
+def test_linear_algebra_runs_on_one_thread():
+    code = "import os, sys; sys.argv = ['curvify', 'schemes']; from curvify.cli import main\n"
+    code += "try: main.main()\nexcept SystemExit: print([os.environ[name] for name in main.THREAD_VARIABLES])"
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "7"}
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, env=environment, check=True)
+    assert ended.stdout.decode().splitlines()[-1] == "['1', '1', '1']"
+
+
+@pytest.mark.parametrize("threads", ["1", "2"])
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_stopped_run_leaves_nothing(folder, number, code, threads):
+    before = sorted(folder.iterdir())
+    command = [*CURVIFY, "refine", "cube.obj", "dense.ply", *LONG, "--threads", threads]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
+        deadline = time.monotonic() + 30
+        while sorted(folder.iterdir()) == before and running.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.02)
+        assert sorted(folder.iterdir()) != before  # the temporary file is there
+        running.send_signal(number)
+        out, err = running.communicate(timeout=30)
+    assert running.returncode == code
+    assert out == b""
+    assert err.count(b"\n") == 1
+    assert err.startswith(b"curvify: ")
+    assert sorted(folder.iterdir()) == before
+
+
+def test_ignored_hangups_stay_ignored(folder):
+    code = "import signal, sys; signal.signal(signal.SIGHUP, signal.SIG_IGN); sys.argv = ['curvify', 'schemes']\n"
+    code += "from curvify.cli.main import main\ntry: main()\nfinally: print(signal.getsignal(signal.SIGHUP).name)"
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+    assert ended.stdout.decode().splitlines()[-1] == "SIG_IGN"
+
+
+@pytest.mark.parametrize("format", ["ply", "obj"])
+def test_a_reader_that_leaves_is_no_error(shell, format):
+    result = shell(
+        f"curvify refine cube.obj - --output-format {format} -k 60 | head -c 100 | wc -c; echo ${{PIPESTATUS[0]}}"
+    )
+    assert result.out.split() == [b"100", b"0"]
+    assert result.err == ""
+
+
+def test_small_output_to_a_reader_that_left(shell):
+    result = shell("(sleep 0.5; curvify schemes --json; echo $? >&2) | true")
+    assert result.err == "0\n"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+def test_no_room_on_standard_output(shell):
+    for command in ("refine cube.obj - --output-format ply", "schemes", "--version"):
+        result = shell(f"curvify {command} > /dev/full")
+        assert result.code == 2
+        assert result.err.startswith("curvify: error: ")
+        assert "no space left" in result.err
+        assert result.err.count("\n") == 1
+
+
+def test_closed_streams(shell):
+    result = shell("curvify refine cube.obj - --output-format ply >&-")
+    assert (result.code, result.err) == (2, "curvify: error: standard output is closed\n")
+    assert shell("curvify refine - dense.ply --input-format obj <&-").err.startswith("curvify: error: ")
+    assert shell("curvify refine dart.obj dense.ply 2>&-").code == 0
+    result = shell("curvify refine dart.obj - --output-format ply 2>&-")
+    assert result.out.startswith(b"ply\n")
+    assert shell("curvify refine absent.obj dense.ply 2>&-").out == b""
+
+
+def test_devices_are_written_straight(shell):
+    result = shell("curvify refine cube.obj /dev/stdout --output-format ply -k 1")
+    assert result.code == 0
+    assert result.out.startswith(b"ply\n")
+    assert shell("curvify refine cube.obj /dev/null --output-format ply --report -").code == 0
+
+
+def test_standard_output_holds_data_only(process):
+    result = process("refine", "dart.obj", "-", "--output-format", "ply", "-v")
+    assert result.code == 0
+    assert "warning" in result.err
+    assert b"curvify" not in result.out
