@@ -121,8 +121,7 @@ class _Evaluation:
         """The input's own vertices."""
         patches, numbering = self.patches, self.numbering
         records = self._records(end - begin)
-        with np.errstate(over="ignore"):  # sinks refuse what does not fit
-            records["position"] = patches.positions[begin:end]
+        records["position"] = patches.positions[begin:end]
         corners = numbering.base_corners[patches.stand_in[begin:end]]
         used = corners >= 0
         records["normal"] = 0

@@ -7,6 +7,7 @@ met on the way.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from curvify.topology import (
 
 WELD_MODES = ("auto", "always", "never")
 SHARP_SOURCES = ("auto", "normals", "none")
-#: Coordinates beyond this would overflow when they are multiplied.
+#: Coordinates beyond this would overflow when they are multiplied, or in float32 files.
 LARGEST_COORDINATE = 1e30
 
 
@@ -143,9 +144,11 @@ def _note_topology(coarse: Coarse, welded: int) -> None:
     counts["zero_area_faces"] = len(flat)
     if len(flat):
         warnings.append(
-            f"{count_of(len(flat), 'face')} without area, first: {loops.source_faces[flat[0]]}; the surface there only follows its edges"
+            f"{count_of(len(flat), 'face')} without area, first: {loops.source_faces[flat[0]]}; "
+            "the surface there only follows its edges"
         )
-    if is_closed(topology) and signed_volume(coarse.positions, loops.offsets, loops.vertices, coarse.area) < 0:
+    volume = partial(signed_volume, coarse.positions, loops.offsets, loops.vertices, coarse.area)
+    if is_closed(topology) and volume() < 0:
         warnings.append("the mesh is closed and inside out: its faces run clockwise seen from outside")
     if mesh.marks.counts():
         found = ", ".join(f"{n} {kind}" for kind, n in mesh.marks.counts().items())

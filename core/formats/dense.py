@@ -21,8 +21,6 @@ from curvify.formats.text import face_lines, join_columns, vector_lines
 from curvify.mesh import DenseMesh, Ints, PolygonMesh
 from curvify.sinks import ArraySink, DenseLayout, Sink
 
-#: Coordinates from which the surface might leave the range of float32.
-LARGE = 1e36
 _PLY_NAMES = {
     "position": ("x", "y", "z"),
     "normal": ("nx", "ny", "nz"),
@@ -42,7 +40,6 @@ class PlySink:
     def begin(self, layout: DenseLayout) -> None:
         """Write the header."""
         self.vertex_type = layout.vertex_type
-        self.huge = float(np.abs(layout.mesh.positions).max(initial=0.0)) > LARGE
         self.sides = 3 if self.triangulate else layout.cell_size
         self.per_cell = layout.cell_size - 2 if self.triangulate else 1
         index = "<i4" if layout.wedge_count < 2**31 else "<u4"
@@ -71,8 +68,6 @@ class PlySink:
 
     def vertices(self, start: int, records: np.ndarray[Any, Any]) -> None:
         """Write a block of wedges."""
-        if self.huge:
-            check_range(records)
         self._put(records, self.origin + start * self.vertex_type.itemsize if self.anywhere else 0)
 
     def faces(self, start: int, wedges: Ints, source_faces: Ints) -> None:
@@ -134,12 +129,6 @@ def ply_header(layout: DenseLayout, face_type: np.dtype[np.void], faces: int, en
     return ("\n".join([*lines, "end_header"]) + "\n").encode()
 
 
-def check_range(records: np.ndarray[Any, Any]) -> None:
-    """Refuse positions that the output type cannot hold."""
-    if not np.isfinite(records["position"]).all():
-        raise FormatError("a coordinate of the surface is too large for float32; give --precision float64")
-
-
 def triangles(cells: Ints, source_faces: Ints) -> tuple[Ints, Ints]:
     """Two triangles for each quad ``(q,4)``, cut from its first corner; triangles stay."""
     if cells.shape[1] == 3:
@@ -167,7 +156,6 @@ class TextPlySink:
 
     def vertices(self, start: int, records: np.ndarray[Any, Any]) -> None:
         """Write a block of wedges, one a line."""
-        check_range(records)
         self.out.write(join_columns([records[name] for name in records.dtype.names or ()]))
 
     def faces(self, start: int, wedges: Ints, source_faces: Ints) -> None:
@@ -203,7 +191,6 @@ class ObjSink:
 
     def vertices(self, start: int, records: np.ndarray[Any, Any]) -> None:
         """Write positions (but not again for repeats), texture coordinates and normals."""
-        check_range(records)
         if start < self.layout.vertex_count:
             if "color" in (records.dtype.names or ()):
                 rows = join_columns([records["position"], float_colors(records["color"])])

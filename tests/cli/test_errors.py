@@ -36,7 +36,7 @@ BAD = {
     "report over OUT": (["refine", "cube.obj", "dense.ply", "--report", "./dense.ply"], "same file"),
     "report nowhere": (["refine", "cube.obj", "dense.ply", "--report", "nowhere/r.json"], "nowhere/r.json"),
     "report of nothing": (["refine", "cube.obj", "dense.ply", "--report", "r.json", "--dry-run"], "--dry-run"),
-    "too large": (["refine", "large.ply", "dense.ply", "--precision", "float32"], "--precision float64"),
+    "too large": (["refine", "large.ply", "dense.ply", "--precision", "float32"], "scale the mesh below"),
     "unknown command": (["refin", "cube.obj", "dense.ply"], "refine"),
     "split empty": (["split", "empty.obj", "dense.ply"], "empty.obj: the mesh has no faces"),
     "split to 2 sides": (["split", "cube.obj", "dense.ply", "--max-sides", "2"], "--max-sides"),

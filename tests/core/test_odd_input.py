@@ -162,7 +162,7 @@ def test_a_vertex_on_the_middle_of_an_edge_is_a_corner_of_180_degrees() -> None:
 def test_a_face_without_area_is_refined_flat_with_a_warning(kind: str) -> None:
     points = [[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [2, 1, 0]]
     surface = curvify.surface(PolygonMesh.from_faces(points, [[0, 1, 2], [0, 2, 4, 3]]), cross_tangent=kind)
-    assert warned(surface, "1 face without area, first: 0; refined flat")
+    assert warned(surface, "1 face without area, first: 0; the surface there only follows its edges")
     dense = surface.refine(3)
     assert np.isfinite(dense.normals).all()
     assert np.abs(dense.positions[:, 2]).max() < 1e-14
@@ -407,13 +407,9 @@ def test_any_polygons_on_a_tiny_lattice_are_refined_or_refused(
     except curvify.MeshError:
         return
     dense = surface.refine(2)
-    assert np.isfinite(dense.positions).all()
-    assert np.isfinite(dense.normals).all()
+    check_sound(dense)
     assert np.abs(dense.positions).max() < 1e3
     assert dense.face_count == surface.face_count(2)
-    assert np.array_equal(dense.wedge_vertices[dense.face_wedges], dense.faces)
-    length = np.linalg.norm(dense.normals, axis=1)
-    assert np.minimum(length, np.abs(length - 1)).max() < 1e-14
 
 
 def test_a_soup_of_concave_faces_closes() -> None:
