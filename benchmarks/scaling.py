@@ -84,9 +84,9 @@ def measure(curvify: str, cases: list[Case], runs: int, folder: Path) -> list[tu
     for _ in range(runs):
         for case, source, costs in results:
             run_case(curvify, source, case, costs, folder)
-    written = {source: costs.vertices for case, source, costs in results if case.output != "pipe"}
-    for _, source, costs in results:
-        costs.vertices = written[source]  # a pipe is not counted: a file beside it holds the same mesh
+    written = {(source, case.level): costs.vertices for case, source, costs in results if case.output != "pipe"}
+    for case, source, costs in results:
+        costs.vertices = written[source, case.level]  # a pipe is not counted: a file beside it holds the same mesh
     return [(case, count_faces(source), costs) for case, source, costs in results]
 
 

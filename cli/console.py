@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from curvify.cli.main import say
+from curvify.words import count_of
 
 #: Seconds of work before a progress bar appears.
 PATIENCE = 0.5
@@ -82,15 +83,10 @@ class Progress:
             self.bar.close()
 
 
-def count(number: int, noun: str, plural: str | None = None) -> str:
-    """``1 face``, ``2,000 faces``."""
-    return f"{number:,} {noun if number == 1 else plural or noun + 's'}"
-
-
 def size(number: int) -> str:
     """Bytes in a unit that suits: ``740 bytes``, ``1.2 MB``."""
     if number < 1000:
-        return count(number, "byte")
+        return count_of(number, "byte")
     value, units = number / 1000, ["kB", "MB", "GB", "TB"]
     while value >= 999.5 and len(units) > 1:
         value, units = value / 1000, units[1:]

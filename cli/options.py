@@ -68,8 +68,8 @@ cross_tangent = option(
     SURFACE,
     "--cross-tangent",
     type=click.Choice(["precise", "smooth", "linear", "quadratic"]),
-    help="How fast the surface leaves the edges: 'precise' for accuracy, 'smooth' its simpler forerunner, the others as "
-    "in the paper.  [default: precise]",
+    help="How fast the surface leaves the edges: 'precise' for accuracy, 'smooth' its forerunner, the others as in "
+    "the paper.  [default: precise]",
 )
 alpha = option(SURFACE, "--alpha", type=float, metavar="A", help="Fullness of 'quadratic', above 0.  [default: 1]")
 normals = option(

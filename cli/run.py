@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from curvify.cli import files
-from curvify.cli.console import Console, count, size
+from curvify.cli.console import Console, size
 from curvify.cli.predict import predicted_bytes, predicted_faces
 from curvify.cli.report import Recorder, refine_report, write_report
 from curvify.errors import FormatError, LimitError, MeshError, OptionError
@@ -24,6 +24,7 @@ from curvify.refinement import Surface, surface
 from curvify.schemes import load_scheme
 from curvify.sinks import DenseLayout
 from curvify.weld import number_dense_mesh
+from curvify.words import count_of
 
 
 @dataclass(frozen=True)
@@ -197,7 +198,7 @@ def _refine(run: Run, console: Console) -> None:
     options = ", ".join(f"{name} {value}" for name, value in asdict(run.options).items())
     console.explain(f"{request.source}: {_sizes(run.surface.patches.counts)}")
     console.explain(f"scheme {request.scheme}, level {request.level}, {options}, {run.dtype.name}")
-    console.explain(f"backend cpu, {count(run.threads, 'thread')}")
+    console.explain(f"backend cpu, {count_of(run.threads, 'thread')}")
     recorder = Recorder(run.surface.patches) if request.report is not None else None
     with timed(run.seconds, "evaluate_and_write"):
         layout = _write(run, recorder, console)
@@ -235,9 +236,9 @@ def _write(run: Run, recorder: Recorder | None, console: Console) -> DenseLayout
 
 
 def _sizes(counts: dict[str, int]) -> str:
-    return f"{count(counts['vertices'], 'vertex', 'vertices')}, {count(counts['faces'], 'face')}"
+    return f"{count_of(counts['vertices'], 'vertex', 'vertices')}, {count_of(counts['faces'], 'face')}"
 
 
 def _dense_sizes(run: Run, layout: DenseLayout) -> str:
-    repeats = f" and {count(len(layout.repeats), 'repeat')} of them" if len(layout.repeats) else ""
-    return f"{count(layout.vertex_count, 'vertex', 'vertices')}{repeats}, {count(run.faces, 'face')}"
+    repeats = f" and {count_of(len(layout.repeats), 'repeat')} of them" if len(layout.repeats) else ""
+    return f"{count_of(layout.vertex_count, 'vertex', 'vertices')}{repeats}, {count_of(run.faces, 'face')}"

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from curvify.cli import options
 from curvify.cli.group import COMMANDS, Command
-
-if TYPE_CHECKING:
-    from curvify.convex import Split
-    from curvify.mesh import PolygonMesh
 
 EXAMPLES = (
     ("Convex faces for a tool that cannot fill concave ones", "curvify split coarse.obj convex.obj"),
@@ -62,10 +58,11 @@ def split_file(
     import numpy as np
 
     from curvify.cli import files
-    from curvify.cli.console import Console, count
-    from curvify.convex import split_polygons
+    from curvify.cli.console import Console
     from curvify.errors import FormatError, MeshError, OptionError
     from curvify.formats import write_mesh
+    from curvify.pieces import split_mesh
+    from curvify.words import count_of
 
     console = Console(quiet, verbose)
     format = files.check_output(output, output_format, no_clobber)
@@ -76,61 +73,11 @@ def split_file(
     name = files.shown_name(input, "stdin")
     if not mesh.face_count:
         raise MeshError(f"{name}: the mesh has no faces; give a mesh with polygons")
-    split = split_polygons(
-        mesh.positions, mesh.face_offsets, mesh.face_vertices, rule=split_rule or "best", max_sides=max_sides
-    )
-    for text in [*mesh.warnings, *split_warnings(split, max_sides)]:
+    pieces, notes = split_mesh(mesh, split_rule or "best", max_sides)
+    for text in [*mesh.warnings, *notes]:
         console.warn(f"{name}: {text}")
-    pieces = pieces_of(mesh, split)
     target = files.shown_name(output, "stdout")
     kind = mesh.position_dtype if precision == "input" else np.dtype(precision)
     with files.naming(target, FormatError):
         write_mesh(pieces, output, format, ascii=ascii, dtype=kind)
-    console.explain(f"{target}: {count(mesh.face_count, 'face')} became {pieces.face_count:,}")
-
-
-def pieces_of(mesh: PolygonMesh, split: Split) -> PolygonMesh:
-    """The mesh with its faces cut; what a corner or face carries goes to its pieces."""
-    import numpy as np
-
-    corners, faces = split.source_corners, split.source_faces
-
-    def carried(values: Any, source: Any) -> Any:
-        return None if values is None else values[source]
-
-    marks = mesh.marks
-    return mesh.with_(
-        face_offsets=split.face_offsets,
-        face_vertices=split.face_vertices,
-        corner_normals=carried(mesh.corner_normals, corners),
-        corner_uvs=carried(mesh.corner_uvs, corners),
-        face_materials=carried(mesh.face_materials, faces),
-        face_groups=carried(mesh.face_groups, faces),
-        face_smoothing=carried(mesh.face_smoothing, faces),
-        marks=type(marks)(
-            **{
-                **vars(marks),
-                "flat_faces": np.flatnonzero(np.isin(faces, marks.flat_faces)),
-                "hole_faces": np.flatnonzero(np.isin(faces, marks.hole_faces)),
-            }
-        ),
-    )
-
-
-def split_warnings(split: Split, max_sides: int) -> list[str]:
-    """What was cut and what could not be, each with its first face."""
-    from curvify.cli.console import count
-
-    texts = {
-        "concave": ("concave face", "concave faces", "split into convex pieces"),
-        "keyhole": ("face that visits a vertex twice", "faces that visit a vertex twice", "split into simple pieces"),
-        "many_sided": (f"face with more than {max_sides} sides", f"faces with more than {max_sides} sides", "split"),
-        "unsplit": ("face that no diagonal can make convex", "faces that no diagonal can make convex", "left as is"),
-        "doubled": ("face", "faces", "cut along an existing edge, for want of any other diagonal"),
-    }
-    counts, first = split.counts, split.first
-    return [
-        f"{count(counts[reason], one, many)} {outcome}, first: {first[reason]}"
-        for reason, (one, many, outcome) in texts.items()
-        if counts.get(reason)
-    ]
+    console.explain(f"{target}: {count_of(mesh.face_count, 'face')} became {pieces.face_count:,}")

@@ -18,6 +18,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from curvify.errors import CurvifyError, FormatError, LimitError, MeshError, OptionError
     from curvify.mesh import DenseMesh, Marks, PolygonMesh
+    from curvify.pieces import split_mesh
     from curvify.refinement import Surface, refine, surface
 
 _WHERE = {
@@ -31,6 +32,7 @@ _WHERE = {
     "PolygonMesh": "mesh",
     "Surface": "refinement",
     "refine": "refinement",
+    "split_mesh": "pieces",
     "surface": "refinement",
 }
 
@@ -47,6 +49,7 @@ __all__ = [
     "__version__",
     "read",
     "refine",
+    "split_mesh",
     "surface",
     "write",
 ]

@@ -27,6 +27,7 @@ from curvify.topology import (
     signed_volume,
     weld_vertices,
 )
+from curvify.words import count_of
 
 WELD_MODES = ("auto", "always", "never")
 SHARP_SOURCES = ("auto", "normals", "none")
@@ -104,11 +105,6 @@ def _check_extent(positions: Floats, mesh: PolygonMesh) -> None:
     span = float(np.ptp(positions, axis=0).max(initial=0.0))
     if 0 < span < 1 / LARGEST_COORDINATE:
         raise MeshError(f"the mesh is only {span:.3g} across; scale it above {1 / LARGEST_COORDINATE:.0e}")
-
-
-def count_of(number: int, noun: str, plural: str | None = None) -> str:
-    """``1 face``, ``2 faces``."""
-    return f"{number} {noun if number == 1 else plural or noun + 's'}"
 
 
 def _note_topology(coarse: Coarse, welded: int) -> None:

@@ -26,8 +26,8 @@ __all__ = [
 
 _OWN = ("obj", "ply", "off")
 #: What trimesh reads and writes for us.
-_READABLE = ("stl", "glb", "gltf", "3mf", "dae")
-_WRITABLE = ("stl", "glb", "dae", "3mf")
+_READABLE = ("stl", "glb", "gltf", "3mf")
+_WRITABLE = ("stl", "glb", "3mf")
 READ_FORMATS = (*_OWN, *_READABLE)
 WRITE_FORMATS = (*_OWN, *_WRITABLE)
 

@@ -16,12 +16,14 @@ from curvify.arrays import cross, values_of
 from curvify.convex import Split, split_at_corners, split_polygons
 from curvify.edges import bending_normals, edge_curves, normal_fields, smooth_tangents
 from curvify.mesh import Bools, Floats, Ints
+from curvify.pieces import MAX_SIDES, split_notes
 from curvify.polygons import newell_normals
-from curvify.prepare import Coarse, count_of
+from curvify.prepare import Coarse
 from curvify.sampling import Sampling
 from curvify.schemes.base import PatchClass, Patches, bernstein, bernstein_slope
 from curvify.sectors import Features, end_normals, sides_of_edges
 from curvify.topology import Topology, link_half_edges
+from curvify.words import count_of
 
 #: A corner of a patch must open by at least the angle with this sine (3 degrees).
 LEAST_CORNER_SINE = float(np.sin(np.radians(3.0)))
@@ -117,7 +119,7 @@ def build_patchwork(
     tangents of some patches. What still folds is counted and warned of.
     """
     loops = coarse.loops
-    split = split_polygons(coarse.positions, loops.offsets, loops.vertices, rule=split_rule)
+    split = split_polygons(coarse.positions, loops.offsets, loops.vertices, rule=split_rule, max_sides=MAX_SIDES)
     corners = np.zeros(len(coarse.positions), dtype=bool)
     work = _build(coarse, coarse.features(corners), split, lengths)
     sines = _corner_sines(work)
@@ -284,20 +286,8 @@ def _least_inward(work: Patchwork, corners: Ints, tangent: Inward) -> Floats:
 def _note_splits(work: Patchwork, folded: Bools) -> None:
     """Warnings and counts of what was split and of what still folds."""
     split, loops = work.split, work.coarse.loops
-    texts = {
-        "concave": ("concave face", "split into convex pieces"),
-        "keyhole": ("face that visits a vertex twice", "split into simple pieces"),
-        "many_sided": ("face with more than 64 sides", "split"),
-        "folding": ("face that would fold", "split"),
-        "unsplit": ("face that no diagonal can make convex", "left as it is"),
-    }
-    for reason, (noun, outcome) in texts.items():
-        number = split.counts.get(reason, 0)
-        work.counts[f"{reason}_faces"] = number
-        if number:
-            first = loops.source_faces[split.first[reason]]
-            plural = noun.replace("face", "faces", 1).replace("visits", "visit")
-            work.warnings.append(f"{count_of(number, noun, plural)} {outcome}, first: {first}")
+    work.counts.update({f"{reason}_faces": number for reason, number in split.counts.items()})
+    work.warnings += split_notes(split, source_faces=loops.source_faces)
     work.counts["folded_patches"] = int(folded.sum())
     work.counts["adjusted_corners"] = work.features.adjusted
     if folded.any():
