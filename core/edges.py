@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from curvify.mesh import Floats
-from curvify.normals import dot, unit
+from curvify.normals import dot, perpendicular, unit
 
 #: A tangent must advance along its edge by at least this cosine.
 LEAST_ADVANCE = 0.05
@@ -35,7 +35,7 @@ def bending_normals(chord: Floats, start_normal: Floats, end_normal: Floats, fac
     candidates = (
         unit(across(start_normal)) + unit(across(end_normal)),
         across(face_normal),
-        across(np.eye(3)[np.abs(along).argmin(axis=-1)]),
+        perpendicular(along),
     )
     for candidate in candidates:
         weak = np.linalg.norm(across(result), axis=-1) < 1e-9

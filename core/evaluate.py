@@ -382,7 +382,9 @@ def blended_normals(patches: Patches, ids: Ints, points: Floats) -> Floats:
         if len(mine):
             corners = patches.topology.offsets[ids[mine]][:, None] + np.arange(patch_class.sides)
             weights = domain_jets(patch_class.sides, points[mine]).w[0]
-            result[mine] = unit(np.einsum("qki,kq->qi", patches.normals[corners], weights))
+            blend = np.einsum("qki,kq->qi", patches.normals[corners], weights)
+            opposite = np.linalg.norm(blend, axis=1, keepdims=True) < 1e-9
+            result[mine] = unit(np.where(opposite, patches.normals[corners[:, 0]], blend))
     return result
 
 

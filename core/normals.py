@@ -31,6 +31,12 @@ def dot(a: Floats, b: Floats) -> Floats:
     return np.einsum("...i,...i->...", a, b)[..., None]
 
 
+def perpendicular(direction: Floats) -> Floats:
+    """Some unit vector ``(...,3)`` across each unit direction."""
+    axis = np.eye(3)[np.abs(direction).argmin(axis=-1)]
+    return unit(axis - dot(axis, direction) * direction)
+
+
 def degrees_between(a: Floats, b: Floats) -> Floats:
     """Angle between vectors ``(...,3)`` in degrees, accurate for small angles too."""
     ua, ub = unit(a), unit(b)
@@ -97,9 +103,7 @@ def _any_normals(positions: Floats, offsets: Ints, vertices: Ints, sectors: Ints
     along = unit(points[next_corners(offsets)] - points)
     chosen = np.zeros_like(along)
     chosen[sectors[corners[::-1]]] = along[corners[::-1]]
-    direction = chosen[sectors[corners]]
-    axis = np.eye(3)[np.abs(direction).argmin(axis=1)]
-    return unit(axis - dot(axis, direction) * direction)
+    return perpendicular(chosen[sectors[corners]])
 
 
 def is_flat_shaded(normals: Floats, offsets: Ints, area: Floats, links: tuple[Ints, Ints]) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from curvify.arrays import cross
 from curvify.edges import LEAST_ADVANCE, bending_normals, smooth_tangents
 from curvify.mesh import Bools, Floats, Ints
-from curvify.normals import SAME_NORMAL, degrees_between, dot, sector_normals, sum_by, unit
+from curvify.normals import SAME_NORMAL, degrees_between, dot, perpendicular, sector_normals, sum_by, unit
 from curvify.topology import Topology, components, corner_links
 
 #: The largest turn of a line at a vertex where it still runs on smoothly (degrees).
@@ -211,7 +211,9 @@ def _fit_normals(
         return normals, 0
     upright = cross(out[refit], back[refit])
     old = normals[refit]
-    flattened = unit(old - dot(old, out[refit]) * out[refit])
+    flattened = old - dot(old, out[refit]) * out[refit]
+    along = np.linalg.norm(flattened, axis=1, keepdims=True) < 1e-6
+    flattened = np.where(along, perpendicular(out[refit]), unit(flattened))
     collinear = np.linalg.norm(upright, axis=1, keepdims=True) < 1e-6
     fitted = unit(upright) * np.where(dot(upright, old) < 0, -1.0, 1.0)
     fitted = np.where(collinear, flattened, fitted)

@@ -126,17 +126,19 @@ def weld_vertices(positions: Floats, offsets: Ints, vertices: Ints, mode: str) -
 
 
 def _pinches(positions: Floats, offsets: Ints, vertices: Ints) -> list[Ints]:
-    """Vertex pairs ``(2,k)`` at one place in one face: where an outline touches itself. Takes 5 corners at least."""
+    """Vertex pairs ``(2,k)`` at one place in one face: where an outline touches itself."""
     sizes = np.diff(offsets)
+    quads = vertices[offsets[:-1][sizes == 4][:, None] + np.arange(4)]
+    across = np.concatenate([quads[:, [0, 2]], quads[:, [1, 3]]])
+    pairs = [across[(positions[across[:, 0]] == positions[across[:, 1]]).all(axis=1)].T]
     corners = np.flatnonzero(np.repeat(sizes > 4, sizes))
-    if not len(corners):
-        return []
-    face = np.repeat(np.arange(len(sizes)), sizes)[corners]
-    place = position_classes(positions[vertices[corners]])
-    order = np.lexsort((place, face))
-    same = (face[order][1:] == face[order][:-1]) & (place[order][1:] == place[order][:-1])
-    one, other = vertices[corners[order[:-1][same]]], vertices[corners[order[1:][same]]]
-    return [np.stack([one, other])]
+    if len(corners):
+        face = np.repeat(np.arange(len(sizes)), sizes)[corners]
+        place = position_classes(positions[vertices[corners]])
+        order = np.lexsort((place, face))
+        same = (face[order][1:] == face[order][:-1]) & (place[order][1:] == place[order][:-1])
+        pairs.append(np.stack([vertices[corners[order[:-1][same]]], vertices[corners[order[1:][same]]]]))
+    return pairs
 
 
 def _stitches(positions: Floats, tails: Ints, heads: Ints) -> list[Ints]:
