@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 HERE = Path(__file__).parent
-#: Libraries under a tool start no threads of their own: it costs them time at this size of work, never gains any.
+#: Libraries under a tool start no threads of their own, so that processor time can be compared.
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 

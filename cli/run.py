@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,6 +22,7 @@ from curvify.mesh import PolygonMesh
 from curvify.refinement import Surface, surface
 from curvify.schemes import load_scheme
 from curvify.sinks import DenseLayout
+from curvify.threads import processors
 from curvify.weld import number_dense_mesh
 from curvify.words import count_of
 
@@ -118,6 +118,7 @@ def refine_file(request: Request) -> None:
     """Do what the command line asks for. Raises CurvifyError."""
     console = Console(request.quiet, request.verbose)
     options, format = check(request)
+    keep_memory()
     seconds: dict[str, float] = {}
     with timed(seconds, "read"):
         mesh = files.read_input(request.input, request.input_format)
@@ -126,7 +127,7 @@ def refine_file(request: Request) -> None:
     warnings = [f"{request.source}: {text}" for text in made.warnings]
     for text in warnings:
         console.warn(text)
-    threads = request.threads or available_processors()
+    threads = request.threads or processors()
     run = Run(request, options, threads, mesh, made, request.dtype(mesh), format, warnings, seconds)
     _check_limit(run)
     if request.dry_run:
@@ -160,11 +161,17 @@ def _check_report(request: Request, report: str) -> None:
             raise OptionError(f"{report}: OUT and --report cannot be the same file")
 
 
-def available_processors() -> int:
-    """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+def keep_memory() -> None:
+    """Ask glibc to keep the memory of work arrays rather than return it: fresh pages cost more than what is done on
+    them. Nothing happens with other C libraries.
+    """
+    import ctypes
+
+    with suppress(AttributeError, OSError, TypeError):
+        c_library = ctypes.CDLL(None)
+        c_library.gnu_get_libc_version  # noqa: B018
+        c_library.mallopt(-3, 32 << 20)  # M_MMAP_THRESHOLD
+        c_library.mallopt(-1, 256 << 20)  # M_TRIM_THRESHOLD
 
 
 @contextmanager

@@ -24,7 +24,7 @@ from curvify.schemes.base import Basis, Controls, Form, PatchClass, Patches, ber
 from curvify.schemes.domain import domain_jets
 
 #: Numbers of Chebyshev points tried, fewest first.
-NODE_COUNTS = (8, 12, 16, 24, 32, 48)
+NODE_COUNTS = (12, 16, 24, 32, 48)
 #: Chebyshev coefficients at the end of the series from which the rest is estimated, and how much to make of that.
 TAIL, SAFETY = 4, 10.0
 #: Coefficients below this share of the longest vector are rounding noise.
@@ -281,24 +281,25 @@ def _evaluate_form(
 ) -> Iterator[tuple[tuple[Ints, slice], Floats]]:
     """Values ``(o,3,f,S)`` of a form, with the index of the patches and samples they belong to."""
     left = np.arange(len(rows))
+    controls = form.controls(rows)
     exact = grid[0] >= MANY_SIDES or len(points) <= FEW_SAMPLES
     for count in () if exact else NODE_COUNTS:
-        controls = form.controls(rows[left])
         nodes = controls.fields(chebyshev_points(count))
         enough = enough_points(nodes, tolerance)
         part = np.flatnonzero(enough)
         for place, values in _by_tables(form, controls.linear, nodes, part, points, (grid, count, orders)):
             yield (left[place[0]], place[1]), values
-        left = left[~enough]
-        if not len(left):
+        if enough.all():
             return
+        rest = np.flatnonzero(~enough)
+        left, controls = left[rest], controls.take(rest)
     size = chunk_size(min(len(points), SAMPLES))
     for begin in range(0, len(left), size):
-        part = left[begin : begin + size]
+        part = np.arange(begin, min(begin + size, len(left)))
+        few = controls.take(part)
         for block in tables(form, points, grid, 0, orders):
             assert block.basis is not None
-            values = exact_values(form.controls(rows[part]), block.basis, orders)
-            yield (part, slice(block.first, block.last)), values
+            yield (left[part], slice(block.first, block.last)), exact_values(few, block.basis, orders)
 
 
 def _by_tables(
@@ -316,7 +317,8 @@ def _by_tables(
 
 
 def _chunk(linear: Floats, nodes: Floats, part: Ints, size: int, block: Tables, orders: int) -> Floats:
-    """One matrix product for a chunk, padded to its fixed size by its last patch."""
+    """One matrix product for a chunk, padded by its last patch to a multiple of 16 patches."""
+    size = min(size, -(-len(part) // 16) * 16)
     padded = np.concatenate([part, np.repeat(part[-1:], size - len(part))])
     columns = linear.shape[2]
     assert block.matrix is not None

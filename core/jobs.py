@@ -23,6 +23,8 @@ from curvify.weld import Numbering, cells_of, repeat_vertices
 
 #: Samples in one job.
 WINDOW = 1 << 17
+#: Points of edges in one job: few, so that their work arrays stay in cache.
+EDGE_WINDOW = 1 << 14
 #: Samples that a patch counts for at least.
 PATCH = 64
 #: What may be left out of the series of a cross tangent, over its length, by output type.
@@ -58,14 +60,14 @@ def dense_jobs(patches: Patches, numbering: Numbering, layout: DenseLayout) -> l
     repeated = numbering.repeats
     jobs: list[tuple[int, Job]] = []
 
-    def add(job: Callable[[int, int, Sink], None], count: int, samples: int) -> None:
-        step = max(WINDOW // max(samples, 1), 1)
+    def add(job: Callable[[int, int, Sink], None], count: int, samples: int, window: int = WINDOW) -> None:
+        step = max(window // max(samples, 1), 1)
         for begin in range(0, count, step):
             end = min(begin + step, count)
             jobs.append(((end - begin) * samples, partial(job, begin, end)))
 
     add(work.input_vertices, len(patches.positions), 1)
-    add(work.edges, outer, numbering.inner)
+    add(work.edges, outer, numbering.inner, EDGE_WINDOW)
     windows = list(work.windows())
     for first, last in windows:
         jobs.append((work.block(first, last)[1], partial(work.insides, first, last)))

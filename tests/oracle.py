@@ -231,7 +231,8 @@ class Patch:
         p, normals = np.array(self.p), np.array(self.normals)
         mean = p.mean(axis=0)
         area = normalized(np.cross(p - mean, np.roll(p, -1, axis=0) - mean).sum(axis=0))
-        m = normalized(normals.sum(axis=0))
+        total = normals.sum(axis=0)
+        m = area if np.sqrt(dot(total, total).real) < 0.2 * self.n else normalized(total)
         axis = normalized(m + max(dot(m, area).real, 0.0) ** 4 * area)
         lifts = [
             -dot(mean - pk, nk + axis) / max(1 + dot(nk, axis).real, 0.5) for pk, nk in zip(p, normals, strict=True)

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from curvify.mesh import Ints
 
 BLOCK_ROWS = 65536
+#: Rows turned into text at once: few, so that the text stays in cache while its commas are replaced.
+TEXT_ROWS = 2048
 
 
 def _json(array: NDArray[np.generic]) -> bytes:
@@ -23,8 +25,10 @@ def vector_lines(prefix: bytes, array: NDArray[np.generic]) -> bytes:
     ``array`` is float32, float64 or any integer type; float32 prints the shortest digits that
     round-trip float32. What is not finite prints as ``nan``.
     """
-    if len(array) == 0:
-        return b""
+    return b"".join(_vector_block(prefix, array[part]) for part in blocks(len(array), TEXT_ROWS))
+
+
+def _vector_block(prefix: bytes, array: NDArray[np.generic]) -> bytes:
     lead = prefix + b" " if prefix else b""
     body = _json(array)[2:-2].replace(b"],[", b"\n" + lead).replace(b",", b" ")
     if array.dtype.kind == "f":
@@ -42,9 +46,12 @@ def face_lines(vertices: Ints, uvs: Ints | None = None, normals: Ints | None = N
     given = [part for part in (vertices, uvs, normals) if part is not None]
     if len(given) == 1:
         return vector_lines(b"f", vertices + 1)
-    body = _json(np.stack(given, axis=-1) + 1)[3:-3]
     inner = b"/" if uvs is not None else b"//"
-    return b"f " + body.replace(b"]],[[", b"\nf ").replace(b"],[", b" ").replace(b",", inner) + b"\n"
+    lines = []
+    for part in blocks(len(vertices), TEXT_ROWS):
+        body = _json(np.stack([columns[part] for columns in given], axis=-1) + 1)[3:-3]
+        lines.append(b"f " + body.replace(b"]],[[", b"\nf ").replace(b"],[", b" ").replace(b",", inner) + b"\n")
+    return b"".join(lines)
 
 
 def corner_tokens(vertices: Ints, uvs: Ints | None, normals: Ints | None) -> list[bytes]:

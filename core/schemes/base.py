@@ -44,6 +44,9 @@ class Controls(Protocol):
     def linear(self) -> Floats:
         """Control vectors ``(3,f,L)``."""
 
+    def take(self, rows: Ints) -> Controls:
+        """Those of some of the faces."""
+
     def fields(self, t: Floats) -> Floats:
         """Side fields ``(3,f,n,m)`` at abscissae ``t (m,)`` or ``(...,n,m)`` per side."""
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from curvify.mesh import Bools, Floats
+from curvify.mesh import Bools, Floats, Ints
 from curvify.schemes.base import bernstein, bernstein_slope
 
 #: Weight of the smooth step in the blend of ``smooth``.
@@ -36,6 +36,10 @@ class Sides:
     start: Floats
     end: Floats
 
+    def take(self, rows: Ints) -> Sides:
+        """Those of some of the faces."""
+        return Sides(self.curves[:, rows], self.fields[:, rows], self.start[:, rows], self.end[:, rows])
+
 
 def projection(fields: Floats, y: Floats) -> Floats:
     """Coefficient q of n_c in y, (n_c.y)/(n_c.n_c), zero where n_c vanishes."""
@@ -54,6 +58,10 @@ class ProjectedBlend:
     sides: Sides
     kind: str
     gains: Floats
+
+    def take(self, rows: Ints) -> ProjectedBlend:
+        """Those of some of the faces."""
+        return ProjectedBlend(self.sides.take(rows), self.kind, self.gains[rows])
 
     def blend(self, t: Floats) -> Floats:
         """Y at ``t``: ``(3,f,n,m)``."""
@@ -138,6 +146,18 @@ class PaperTangent:
         ends = tangent.fields(np.array([0.0, 1.0]))
         tangent.corrections = (sides.start - ends[..., 0], sides.end - ends[..., 1])
         return tangent
+
+    def take(self, rows: Ints) -> PaperTangent:
+        """Those of some of the faces."""
+        first, last = self.corrections
+        return PaperTangent(
+            self.sides.take(rows),
+            self.points[:, rows],
+            self.guides[:, rows],
+            self.spare.take(rows),
+            self.degenerate[rows],
+            (first[:, rows], last[:, rows]),
+        )
 
     def _chord(self, t: Floats) -> tuple[Floats, Floats]:
         """x(t), from the curve to the line between the next corners, and its derivative."""

@@ -113,6 +113,10 @@ class GregoryControls:
     linear: Floats
     tangent: CrossTangent
 
+    def take(self, rows: Ints) -> GregoryControls:
+        """Those of some of the patches."""
+        return GregoryControls(self.linear[:, rows], self.tangent.take(rows))
+
     def fields(self, t: Floats) -> Floats:
         """Cross tangents ``(3,f,n,m)``."""
         return self.tangent.fields(t)
@@ -234,6 +238,10 @@ class NormalControls:
 
     work: Patchwork
     corners: Ints
+
+    def take(self, rows: Ints) -> NormalControls:
+        """Those of some of the patches."""
+        return NormalControls(self.work, self.corners[rows])
 
     @property
     def linear(self) -> Floats:

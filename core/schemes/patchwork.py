@@ -30,7 +30,7 @@ LEAST_CORNER_SINE = float(np.sin(np.radians(3.0)))
 #: Rounds of making corners and of splitting folded faces.
 ROUNDS = 4
 #: Patches looked at together in the fold tests.
-WINDOW = 2048
+WINDOW = 512
 
 
 class Inward(Protocol):

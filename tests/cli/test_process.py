@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -69,7 +70,9 @@ def test_linear_algebra_runs_on_one_thread():
 def test_a_stopped_run_leaves_nothing(folder, number, code, threads):
     before = sorted(folder.iterdir())
     command = [*CURVIFY, "refine", "cube.obj", "dense.ply", *LONG, "--threads", threads]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
+    # Background jobs of a shell ignore interrupts and pass that on: start from the default.
+    default = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=default) as running:
         deadline = time.monotonic() + 30
         while sorted(folder.iterdir()) == before and running.poll() is None and time.monotonic() < deadline:
             time.sleep(0.02)

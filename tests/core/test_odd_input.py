@@ -181,7 +181,6 @@ def test_faces_without_area_have_unit_normals() -> None:
     check_sound(refined(sliver(), 2))
 
 
-@pytest.mark.xfail(strict=True, reason="where corner normals cancel their blend is no unit normal")
 def test_a_face_with_a_spike_has_unit_normals() -> None:
     """A triangle and a spike that leaves it from a corner and comes back."""
     points = [[0, 0, 0], [1, 0, 0], [0, 0, 1], [0, 1, 0]]

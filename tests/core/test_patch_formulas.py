@@ -10,6 +10,7 @@ import pytest
 
 import curvify
 from curvify import evaluate
+from curvify.schemes.gregory import center_point
 from curvify.schemes.gregory_basis import gregory_basis
 from oracle import Patch
 from surfaces import (
@@ -78,6 +79,16 @@ def test_the_middle_of_a_precise_patch_is_its_center_point(sides: int) -> None:
     mesh, points, normals = polygon_patch(sides, 3)
     position, _ = curvify.surface(mesh, sharp_from="normals").evaluate(np.zeros(1, dtype=int), np.zeros((1, 2)))
     assert np.abs(position[0] - Patch(points, normals, "precise").center()).max() < 1e-14
+
+
+@each_size
+def test_center_points_follow_the_equations_for_wild_normals_too(sides: int) -> None:
+    _, points, _ = polygon_patch(sides, 3)
+    generator = np.random.default_rng(sides)
+    for _ in range(20):
+        normals = unit(generator.standard_normal((sides, 3)))
+        found = center_point(points.T[:, None], normals.T[:, None])[:, 0]
+        assert np.abs(found - Patch(points, normals, "precise").center()).max() < 1e-13
 
 
 @each_tangent
