@@ -91,10 +91,16 @@ class ProjectedBlend:
         factor, slope = self._fullness(t)
         return factor * y, slope * y + factor * y_slope
 
-    def inward(self, t: Floats) -> Floats:
-        """What T points towards across the edge: Y before its part along n_c is taken away."""
+    def towards(self, direction: Floats, t: Floats) -> Floats:
+        """Product ``(f,n,m)`` of T with vectors ``(3,f,n,m)`` across n_c, up to a positive factor.
+
+        The part along n_c that T lacks makes no difference, nor does its fullness.
+        """
         h, _ = self._step(t)
-        return self.sides.start[..., None] * h + self.sides.end[..., None] * (1 - h)
+        start = np.einsum("cfnm,cfn->fnm", direction, self.sides.start)
+        start *= h
+        start += np.einsum("cfnm,cfn->fnm", direction, self.sides.end) * (1 - h)
+        return start
 
     def _step(self, t: Floats) -> tuple[Floats, Floats]:
         """The share h of the start, and h'."""
@@ -192,9 +198,9 @@ class PaperTangent:
         """T at ``t``: ``(3,f,n,m)``."""
         return self.field_derivatives(t)[0]
 
-    def inward(self, t: Floats) -> Floats:
-        """T itself."""
-        return self.fields(t)
+    def towards(self, direction: Floats, t: Floats) -> Floats:
+        """Product ``(f,n,m)`` of T with vectors ``(3,f,n,m)``."""
+        return dot(direction, self.fields(t))
 
     def field_derivatives(self, t: Floats) -> tuple[Floats, Floats]:
         """T and T' at ``t`` (equation 11 with the end corrections)."""

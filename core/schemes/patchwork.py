@@ -21,6 +21,7 @@ from curvify.polygons import newell_normals
 from curvify.prepare import Coarse
 from curvify.sampling import Sampling
 from curvify.schemes.base import PatchClass, Patches, bernstein, bernstein_slope
+from curvify.schemes.cross_tangents import Sides
 from curvify.sectors import Features, end_normals, sides_of_edges
 from curvify.topology import Topology, link_half_edges
 from curvify.words import count_of
@@ -34,10 +35,16 @@ WINDOW = 512
 
 
 class Inward(Protocol):
-    """Anything that tells on which side of its edges a patch begins."""
+    """Cross tangents, as far as the fold test asks: on which side of its edges a patch begins."""
 
-    def inward(self, t: Floats) -> Floats:
-        """Vectors ``(3,f,n,m)`` at ``t (m,)`` on the same side of the edge curve as the cross tangents."""
+    @property
+    def sides(self) -> Sides:
+        """Side data of the patches."""
+
+    def towards(self, direction: Floats, t: Floats) -> Floats:
+        """Product ``(f,n,m)`` of vectors ``(3,f,n,m)`` at ``t (m,)`` with T, up to a positive factor; the vectors are
+        perpendicular to the edge's normal field.
+        """
 
 
 @dataclass(eq=False)
@@ -266,7 +273,7 @@ def _bad_corners(
         for begin in range(0, len(patches), WINDOW):
             rows = patches[begin : begin + WINDOW]
             corners = work.topology.offsets[rows][:, None] + np.arange(size)
-            inward = _least_inward(work, corners, tangents_of(work, corners))
+            inward = _least_inward(tangents_of(work, corners))
             face, side = np.nonzero(inward <= 0)
             if len(face):
                 folded[rows[face]] = True
@@ -275,12 +282,11 @@ def _bad_corners(
     return bad, folded
 
 
-def _least_inward(work: Patchwork, corners: Ints, tangent: Inward) -> Floats:
+def _least_inward(tangent: Inward) -> Floats:
     """Smallest (C' x T).n_c ``(f,n)`` at 9 abscissae of each side, up to a positive factor."""
     t = np.arange(1, 10) / 10
-    slope = bernstein_slope(work.side_curves(corners), t)
-    normal = bernstein(work.side_fields(corners), t)
-    return np.einsum("cfnm,cfnm->fnm", cross(normal, slope, axis=0), tangent.inward(t)).min(axis=-1)
+    across = cross(bernstein(tangent.sides.fields, t), bernstein_slope(tangent.sides.curves, t), axis=0)
+    return tangent.towards(across, t).min(axis=-1)
 
 
 def _note_splits(work: Patchwork, folded: Bools) -> None:
