@@ -350,16 +350,22 @@ def exact_values(controls: Controls, basis: Basis, orders: int = 3) -> Floats:
     return total
 
 
+def _rows_of(patch_class: PatchClass, ids: Ints) -> Ints:
+    """Row of each patch in a class ``(m,)``, -1 where it is in another."""
+    rows = np.minimum(np.searchsorted(patch_class.patches, ids), len(patch_class.patches) - 1)
+    return np.where(patch_class.patches[rows] == ids, rows, -1)
+
+
 def evaluate_at(patches: Patches, ids: Ints, points: Floats) -> tuple[Floats, Floats, Floats]:
     """Position and derivatives by xi and eta ``(m,3)`` of patches ``ids (m,)`` at domain points ``(m,2)`` of
     their own: exact, for any points of the closed domain.
     """
     result = np.empty((3, len(ids), 3))
     for patch_class in patches.classes:
-        mine = np.flatnonzero(patches.topology.sizes[ids] == patch_class.sides)
+        mine = np.flatnonzero(_rows_of(patch_class, ids) >= 0)
         for begin in range(0, len(mine), SAMPLES):
             part = mine[begin : begin + SAMPLES]
-            rows = np.searchsorted(patch_class.patches, ids[part])
+            rows = _rows_of(patch_class, ids[part])
             basis = patch_class.surface.basis(points[part])
             controls = patch_class.surface.controls(rows)
             total = np.einsum("cql,oql->oqc", controls.linear, basis.linear)
@@ -380,7 +386,7 @@ def blended_normals(patches: Patches, ids: Ints, points: Floats) -> Floats:
     """Corner normals of patches blended over their domains ``(m,3)``: for where derivatives are parallel."""
     result = np.empty((len(ids), 3))
     for patch_class in patches.classes:
-        mine = np.flatnonzero(patches.topology.sizes[ids] == patch_class.sides)
+        mine = np.flatnonzero(_rows_of(patch_class, ids) >= 0)
         if len(mine):
             corners = patches.topology.offsets[ids[mine]][:, None] + np.arange(patch_class.sides)
             weights = domain_jets(patch_class.sides, points[mine]).w[0]

@@ -14,7 +14,7 @@ import numpy as np
 
 from curvify.arrays import cross
 from curvify.errors import OptionError
-from curvify.mesh import Floats, Ints, PolygonMesh
+from curvify.mesh import Bools, Floats, Ints, PolygonMesh
 from curvify.prepare import prepare_mesh
 from curvify.sampling import kite_sampling
 from curvify.schemes.base import Basis, Form, PatchClass, Patches, bernstein
@@ -24,6 +24,8 @@ from curvify.schemes.patchwork import Patchwork, build_patchwork
 
 CROSS_TANGENTS = ("precise", "smooth", "linear", "quadratic")
 NORMALS = ("exact", "paper")
+#: A side that is more than this share of a polygon's outline makes it uneven.
+LARGE_SHARE = 0.3
 
 name = "gregory"
 summary = "n-sided Gregory patches: interpolates vertices and normals, smooth everywhere"
@@ -80,16 +82,30 @@ def prepare(mesh: PolygonMesh, options: Options | None = None) -> Patches:
     classes = []
     for sides, patches in work.size_classes():
         corners = work.topology.offsets[patches][:, None] + np.arange(sides)
-        classes.append(_patch_class(work, sides, patches, corners, options))
+        uneven = is_uneven(work.corner_points(corners))
+        for group in (False, True):
+            rows = np.flatnonzero(uneven == group)
+            if len(rows):
+                classes.append(_patch_class(work, patches[rows], corners[rows], group, options))
     return work.patches(classes, kite_sampling)
 
 
-def _patch_class(work: Patchwork, sides: int, patches: Ints, corners: Ints, options: Options) -> PatchClass:
+def is_uneven(points: Floats) -> Bools:
+    """Polygons ``(3,f,n)`` one side of which is more than ``LARGE_SHARE`` of the outline; of 7 sides at least."""
+    if points.shape[2] < 7:
+        return np.zeros(points.shape[1], dtype=bool)
+    sides = np.roll(points, -1, axis=2) - points
+    lengths = np.sqrt(dot(sides, sides))
+    return lengths.max(axis=1) > LARGE_SHARE * lengths.sum(axis=1)
+
+
+def _patch_class(work: Patchwork, patches: Ints, corners: Ints, uneven: bool, options: Options) -> PatchClass:
     corrected = options.cross_tangent == "precise"
+    sides = corners.shape[1]
     surface = Form(
-        ("gregory", sides, corrected),
-        partial(_surface_basis, sides, corrected),
-        lambda rows: GregoryControls.build(work, corners[rows], options),
+        ("gregory", sides, corrected, uneven),
+        partial(_surface_basis, sides, corrected, uneven),
+        lambda rows: GregoryControls.build(work, corners[rows], uneven, options),
     )
     if options.normals == "exact":
         return PatchClass(sides, patches, surface)
@@ -99,8 +115,8 @@ def _patch_class(work: Patchwork, sides: int, patches: Ints, corners: Ints, opti
     return PatchClass(sides, patches, surface, blended)
 
 
-def _surface_basis(sides: int, corrected: bool, points: Floats) -> Basis:
-    return gregory_basis(sides, points, corrected)
+def _surface_basis(sides: int, corrected: bool, uneven: bool, points: Floats) -> Basis:
+    return gregory_basis(sides, points, corrected, uneven)
 
 
 CrossTangent = ProjectedBlend | PaperTangent
@@ -126,7 +142,7 @@ class GregoryControls:
         return self.tangent.field_derivatives(t)
 
     @classmethod
-    def build(cls, work: Patchwork, corners: Ints, options: Options) -> GregoryControls:
+    def build(cls, work: Patchwork, corners: Ints, uneven: bool, options: Options) -> GregoryControls:
         """Controls of the patches with the given corners ``(f,n)``."""
         n = corners.shape[1]
         points, tangent, target = cross_tangents(work, corners, options)
@@ -143,7 +159,7 @@ class GregoryControls:
         for i, block in enumerate(blocks):
             linear[..., n * i : n * (i + 1)] = block
         if target is not None:
-            basis = center_row(n, True)
+            basis = center_row(n, uneven)
             center = linear @ basis.linear[0, 0] + value[..., 1] @ basis.weights[0, 0]
             center += value[..., 0] @ basis.ends[0, 0, :, 0] + value[..., 2] @ basis.ends[0, 0, :, 1]
             linear[..., -1] = target - center
