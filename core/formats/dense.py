@@ -16,8 +16,7 @@ import numpy as np
 
 from curvify.errors import FormatError
 from curvify.formats import WRITE_FORMATS, atomic_file, find_format, write_stream
-from curvify.formats.obj_write import clean_name, float_colors
-from curvify.formats.text import face_lines, join_columns, vector_lines
+from curvify.formats.files import clean_name
 from curvify.mesh import DenseMesh, Ints, PolygonMesh
 from curvify.sinks import ArraySink, DenseLayout, Sink
 
@@ -44,9 +43,9 @@ class PlySink:
         self.per_cell = layout.cell_size - 2 if self.triangulate else 1
         index = "<i4" if layout.wedge_count < 2**31 else "<u4"
         fields: list[tuple[Any, ...]] = [("count", "u1"), ("corners", index, self.sides)]
-        fields += [(name, "<i4") for name, _ in _face_columns(layout.mesh)]
+        fields += [(name, "<i4") for name, _ in face_columns(layout.mesh)]
         self.face_type = np.dtype(fields)
-        self.columns = [values for _, values in _face_columns(layout.mesh)]
+        self.columns = [values for _, values in face_columns(layout.mesh)]
         header = ply_header(layout, self.face_type, layout.face_count * self.per_cell, "binary_little_endian")
         self._check_room(len(header) + layout.wedge_count * self.vertex_type.itemsize, layout)
         self.out.write(header)
@@ -102,7 +101,7 @@ class PlySink:
         """Everything is in its place already."""
 
 
-def _face_columns(mesh: PolygonMesh) -> Iterator[tuple[str, Ints]]:
+def face_columns(mesh: PolygonMesh) -> Iterator[tuple[str, Ints]]:
     """Face properties that a PLY file carries."""
     if mesh.face_materials is not None:
         yield "material_index", mesh.face_materials
@@ -137,102 +136,6 @@ def triangles(cells: Ints, source_faces: Ints) -> tuple[Ints, Ints]:
     return halves, np.repeat(source_faces, 2)
 
 
-class TextPlySink:
-    """Ascii PLY."""
-
-    anywhere = False
-
-    def __init__(self, out: BinaryIO, triangulate: bool = False) -> None:
-        self.out, self.triangulate = out, triangulate
-
-    def begin(self, layout: DenseLayout) -> None:
-        """Write the header."""
-        sides = 3 if self.triangulate else layout.cell_size
-        self.columns = list(_face_columns(layout.mesh))
-        fields: list[tuple[Any, ...]] = [("count", "u1"), ("corners", "<i4", sides)]
-        face_type = np.dtype(fields + [(name, "<i4") for name, _ in self.columns])
-        faces = layout.face_count * (layout.cell_size - 2 if self.triangulate else 1)
-        self.out.write(ply_header(layout, face_type, faces, "ascii"))
-
-    def vertices(self, start: int, records: np.ndarray[Any, Any]) -> None:
-        """Write a block of wedges, one a line."""
-        self.out.write(join_columns([records[name] for name in records.dtype.names or ()]))
-
-    def faces(self, start: int, wedges: Ints, source_faces: Ints) -> None:
-        """Write a block of faces, one a line."""
-        if self.triangulate:
-            wedges, source_faces = triangles(wedges, source_faces)
-        parts = [np.full((len(wedges), 1), wedges.shape[1]), wedges]
-        parts += [values[source_faces][:, None] for _, values in self.columns]
-        self.out.write(vector_lines(b"", np.concatenate(parts, axis=1)))
-
-    def end(self) -> None:
-        """Nothing is left to do."""
-
-
-class ObjSink:
-    """OBJ text: one ``v`` for each vertex, one ``vn`` (and ``vt``) for each wedge, materials and groups kept."""
-
-    anywhere = False
-
-    def __init__(self, out: BinaryIO, triangulate: bool = False) -> None:
-        self.out, self.triangulate = out, triangulate
-
-    def begin(self, layout: DenseLayout) -> None:
-        """Write the names of the material files."""
-        self.layout = layout
-        self.has_uv = "uv" in (layout.vertex_type.names or ())
-        mesh = layout.mesh
-        states = ((b"g", mesh.face_groups, mesh.group_names), (b"usemtl", mesh.face_materials, mesh.material_names))
-        self.states = [(word, values, names) for word, values, names in states if values is not None]
-        self.current: tuple[int, ...] = (-1,) * len(self.states)
-        for name in mesh.material_files:
-            self.out.write(f"mtllib {clean_name(name)}\n".encode())
-
-    def vertices(self, start: int, records: np.ndarray[Any, Any]) -> None:
-        """Write positions (but not again for repeats), texture coordinates and normals."""
-        if start < self.layout.vertex_count:
-            if "color" in (records.dtype.names or ()):
-                rows = join_columns([records["position"], float_colors(records["color"])])
-                self.out.write(b"v " + rows[:-1].replace(b"\n", b"\nv ") + b"\n")
-            else:
-                self.out.write(vector_lines(b"v", records["position"]))
-        if self.has_uv:
-            self.out.write(vector_lines(b"vt", records["uv"]))
-        self.out.write(vector_lines(b"vn", records["normal"]))
-
-    def faces(self, start: int, wedges: Ints, source_faces: Ints) -> None:
-        """Write a block of faces, with the groups and materials where they change."""
-        if self.triangulate:
-            wedges, source_faces = triangles(wedges, source_faces)
-        vertices = wedges
-        if len(self.layout.repeats):
-            extra = wedges - self.layout.vertex_count
-            vertices = np.where(extra < 0, wedges, self.layout.repeats[np.maximum(extra, 0)])
-        for part in self._runs(source_faces):
-            uv = wedges[part] if self.has_uv else None
-            self.out.write(face_lines(vertices[part], uv, wedges[part]))
-
-    def _runs(self, source_faces: Ints) -> Iterator[slice]:
-        """Runs of faces with one material and group; writes the lines that announce a new one."""
-        if not self.states:
-            yield slice(None)
-            return
-        columns = np.stack([values[source_faces] for _, values, _ in self.states], axis=1)
-        heads = np.flatnonzero(np.concatenate([[True], (columns[1:] != columns[:-1]).any(axis=1)]))
-        for first, last in zip(heads.tolist(), [*heads[1:].tolist(), len(columns)], strict=True):
-            state = tuple(columns[first].tolist())
-            for (word, _, names), value, before in zip(self.states, state, self.current, strict=True):
-                if value != before:
-                    name = clean_name(names[value]).encode() if value >= 0 else b""
-                    self.out.write((word + b" " + name).rstrip() + b"\n")
-            self.current = state
-            yield slice(first, last)
-
-    def end(self) -> None:
-        """Nothing is left to do."""
-
-
 @contextmanager
 def dense_output(
     path: str | os.PathLike[str],
@@ -259,12 +162,14 @@ def dense_output(
 
 @contextmanager
 def _sink(out: BinaryIO, format: str, ascii: bool, triangulate: bool, streamed: bool) -> Iterator[Sink]:
-    if format == "obj":
-        yield ObjSink(out, triangulate)
-    elif format == "ply":
+    if format == "ply" and not ascii:
         binary = PlySink(out, triangulate)
         binary.anywhere = binary.anywhere and not streamed
-        yield TextPlySink(out, triangulate) if ascii else binary
+        yield binary
+    elif format in ("obj", "ply"):
+        from curvify.formats import dense_text
+
+        yield dense_text.ObjSink(out, triangulate) if format == "obj" else dense_text.TextPlySink(out, triangulate)
     else:
         collected = ArraySink()
         yield collected

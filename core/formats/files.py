@@ -108,3 +108,8 @@ def _open_beside(name: str) -> tuple[BinaryIO, Path, Path]:
     with suppress(OSError):
         temporary.chmod(stat.S_IMODE(target.stat().st_mode))
     return os.fdopen(descriptor, "w+b"), temporary, target
+
+
+def clean_name(name: str) -> str:
+    """A name that fits on one line of a text file."""
+    return " ".join(name.split())

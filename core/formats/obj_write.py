@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from curvify.errors import FormatError
+from curvify.formats.files import clean_name
 from curvify.formats.obj_tags import tag_lines
 from curvify.formats.text import blocks, corner_tokens, join_columns, vector_lines
 from curvify.formats.wedges import unique_rows
@@ -25,11 +26,6 @@ def round_to(values: Floats, dtype: np.dtype[np.floating], what: str = "coordina
     if np.isinf(out).any():
         raise FormatError(f"a {what} is too large for {dtype.name}; write float64 or scale the mesh down")
     return out
-
-
-def clean_name(name: str) -> str:
-    """A name that fits on one line of a text file."""
-    return " ".join(name.split())
 
 
 def write_obj(mesh: PolygonMesh, out: BinaryIO, dtype: FloatType | None = None) -> None:

@@ -8,7 +8,8 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from curvify.formats.obj_write import FloatType, clean_name, round_to
+from curvify.formats.files import clean_name
+from curvify.formats.obj_write import FloatType, round_to
 from curvify.formats.text import join_columns, polygon_lines
 from curvify.formats.wedges import Wedges, split_vertices, wedge_rows
 from curvify.mesh import Bools, Floats, Ints, PolygonMesh
