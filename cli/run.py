@@ -157,8 +157,9 @@ def _check_report(request: Request, report: str) -> None:
         raise OptionError("OUT and --report cannot both be standard output")
     if report != files.STREAM:
         files.check_folder(report)
-        if request.output != files.STREAM and Path(report).resolve() == Path(request.output).resolve():
-            raise OptionError(f"{report}: OUT and --report cannot be the same file")
+        for other, name in ((request.output, "OUT"), (request.input, "IN")):
+            if other != files.STREAM and Path(report).resolve() == Path(other).resolve():
+                raise OptionError(f"{report}: {name} and --report cannot be the same file")
 
 
 def keep_memory() -> None:

@@ -108,7 +108,11 @@ class Tables:
 
 
 class _TableCache:
-    """The tables used last, up to a number of bytes in all."""
+    """Tables up to a number of bytes in all.
+
+    When it is full, the tables of other surfaces make room, oldest first, never those of the same: every patch asks
+    for all blocks of its tables in turn, and dropping the oldest would drop each just before it is asked for.
+    """
 
     def __init__(self, most: int) -> None:
         self.most, self.size = most, 0
@@ -125,15 +129,16 @@ class _TableCache:
         made = make()
         size = made.bytes
         with self.lock:
-            if key not in self.tables:
+            others = [old for old in self.tables if old[:-1] != key[:-1]]
+            while self.size + size > self.most and others:
+                self.size -= self.tables.pop(others.pop(0)).bytes
+            if key not in self.tables and self.size + size <= self.most:
                 self.tables[key] = made
                 self.size += size
-            while self.size > self.most:
-                self.size -= self.tables.pop(next(iter(self.tables))).bytes
         return made
 
 
-_CACHE = _TableCache(96 << 20)
+_CACHE = _TableCache(160 << 20)
 
 
 def tables(form: Form, points: Floats, grid: tuple[int, int], count: int, orders: int) -> Iterator[Tables]:

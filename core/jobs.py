@@ -19,7 +19,7 @@ from curvify.schemes.base import PatchClass, Patches
 from curvify.sectors import sides_of_edges
 from curvify.sinks import DenseLayout, Sink
 from curvify.threads import Job
-from curvify.weld import Numbering, cells_of, repeat_vertices
+from curvify.weld import Numbering, cells_of, corner_colors, repeat_vertices
 
 #: Samples in one job.
 WINDOW = 1 << 17
@@ -85,7 +85,7 @@ class _Evaluation:
     def __init__(self, patches: Patches, numbering: Numbering, layout: DenseLayout) -> None:
         self.patches, self.numbering, self.layout = patches, numbering, layout
         self.tolerance = SERIES_TOLERANCE[layout.vertex_type["position"].base.name]
-        self.colors = patches.mesh.vertex_colors
+        self.colors = corner_colors(patches)
         self.first_half_edges = sides_of_edges(patches.topology)[0]
         outer = len(patches.topology.edges) - len(patches.inner_faces)
         self.inner_starts = numbering.edge_starts[outer:]
@@ -132,7 +132,7 @@ class _Evaluation:
             records["uv"] = 0
             records["uv"][used] = np.nan_to_num(numbering.uvs[corners[used]])
         if self.colors is not None:
-            records["color"] = self.colors[begin:end]
+            records["color"] = self.patches.mesh.vertex_colors[begin:end]  # type: ignore[index]
         sink.vertices(begin, records)
 
     def edges(self, begin: int, end: int, sink: Sink) -> None:
@@ -167,7 +167,7 @@ class _Evaluation:
         if self.numbering.uvs is not None:
             yield "uv", np.nan_to_num(self.numbering.uvs)
         if self.colors is not None:
-            yield "color", self.colors[self.patches.topology.vertices].astype(np.float64)
+            yield "color", self.colors
 
     def insides(self, first: int, last: int, sink: Sink) -> None:
         """The insides of patches first to last, with the diagonals of their faces."""

@@ -102,6 +102,8 @@ def _check_extent(positions: Floats, mesh: PolygonMesh) -> None:
     extent = float(np.abs(positions).max(initial=0.0))
     if extent > LARGEST_COORDINATE:
         raise MeshError(f"a coordinate is as large as {extent:.3g}; scale the mesh below {LARGEST_COORDINATE:.0e}")
+    if mesh.corner_uvs is not None and np.abs(np.nan_to_num(mesh.corner_uvs)).max(initial=0.0) > LARGEST_COORDINATE:
+        raise MeshError(f"a texture coordinate is larger than {LARGEST_COORDINATE:.0e}; scale or remove it")
     span = float(np.ptp(positions, axis=0).max(initial=0.0))
     if 0 < span < 1 / LARGEST_COORDINATE:
         raise MeshError(f"the mesh is only {span:.3g} across; scale it above {1 / LARGEST_COORDINATE:.0e}")

@@ -14,7 +14,6 @@ from curvify import evaluate
 from curvify.arrays import cross, values_of
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import degrees_between
-from curvify.polygons import newell_normals
 from curvify.sampling import domain_corners
 from curvify.schemes.base import Patches
 from curvify.topology import is_closed, signed_volume
@@ -77,9 +76,3 @@ def volume_ratio(patches: Patches, positions: Floats, faces: Ints) -> float | No
     offsets = np.arange(len(faces) + 1) * faces.shape[1]
     dense = signed_volume(positions.astype(np.float64), offsets, faces.reshape(-1))
     return dense / coarse if coarse else None
-
-
-def surface_area(positions: Floats, faces: Ints) -> float:
-    """Area of a mesh of planar polygons ``faces (Q,s)``."""
-    offsets = np.arange(len(faces) + 1) * faces.shape[1]
-    return float(np.linalg.norm(newell_normals(positions, offsets, faces.reshape(-1)), axis=1).sum() / 2)

@@ -21,7 +21,7 @@ from curvify.schemes import load_scheme
 from curvify.schemes.base import Patches
 from curvify.sinks import ArraySink, DenseLayout, Sink
 from curvify.threads import Progress, run_jobs
-from curvify.weld import number_dense_mesh, predict_faces
+from curvify.weld import cell_sources, number_dense_mesh, predict_faces
 
 #: Faces that a dense mesh may have unless the caller allows more.
 MAX_FACES = 50_000_000
@@ -78,7 +78,9 @@ class Surface:
         """The dense mesh of level k as arrays; see ``stream`` for the other options."""
         sink = ArraySink()
         self.stream(sink, level, dtype, **run)
-        return sink.dense_mesh()
+        dense = sink.dense_mesh()
+        dense.source_patches, dense.source_parameters = cell_sources(self.patches, level)
+        return dense
 
     def stream(
         self,
@@ -96,7 +98,7 @@ class Surface:
         Raises OptionError for a level below 1, LimitError for more faces than ``max_faces``.
         """
         if int(level) != level or level < 1:
-            raise OptionError(f"the level must be a whole number from 1 on, not {level}")
+            raise OptionError(f"the level must be a whole number from 1 on, not {level!r}")
         faces = self.face_count(int(level))
         if faces > max_faces:
             raise LimitError(

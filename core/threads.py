@@ -45,16 +45,17 @@ def run_jobs(
                 state.fail(error)
 
     workers = [threading.Thread(target=work, daemon=True) for _ in range(count)]
-    for worker in workers:
-        worker.start()
     try:
+        for worker in workers:
+            worker.start()
         for worker in workers:
             while worker.is_alive():
                 worker.join(0.1)
     except BaseException as error:
         state.fail(error)
         for worker in workers:  # one may hang in a pipe that nobody reads
-            worker.join(None if sink.anywhere else 1.0)
+            if worker.ident is not None:
+                worker.join(None if sink.anywhere else 1.0)
         raise
     if state.error is not None:
         raise state.error

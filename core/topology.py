@@ -14,6 +14,9 @@ from curvify.arrays import distinct
 from curvify.mesh import Bools, Floats, Ints
 from curvify.polygons import newell_normals, next_corners, previous_corners
 
+#: Squared length below which an edge has none: what is divided by it would overflow.
+NO_LENGTH = 1e-280
+
 
 @dataclass(eq=False)
 class Loops:
@@ -117,7 +120,8 @@ def weld_vertices(positions: Floats, offsets: Ints, vertices: Ints, mode: str) -
         np.minimum.at(first, classes, np.arange(count))
         return first[classes]
     heads = vertices[next_corners(offsets)]
-    short = (positions[vertices] == positions[heads]).all(axis=1) & (vertices != heads)
+    step = positions[vertices] - positions[heads]
+    short = (np.einsum("ci,ci->c", step, step) < NO_LENGTH) & (vertices != heads)
     links = [np.stack([vertices[short], heads[short]]), *_pinches(positions, offsets, vertices)]
     if mode == "auto":
         links += _stitches(positions, vertices, heads)

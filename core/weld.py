@@ -78,6 +78,20 @@ def predict_faces(patches: Patches, level: int) -> int:
     return sum(len(c.patches) * len(patches.sampling(c.sides, 1).cells) for c in patches.classes) * level**2
 
 
+def cell_sources(patches: Patches, level: int) -> tuple[Ints, Floats]:
+    """Patch ``(Q,)`` of each cell of the dense mesh, and the middle of the cell in its domain ``(Q,2)``."""
+    samplings = {c.sides: patches.sampling(c.sides, level) for c in patches.classes}
+    sizes = patches.topology.sizes
+    counts = np.array([len(samplings[int(size)].cells) for size in values_of(sizes)])
+    cells = counts[np.searchsorted(values_of(sizes), sizes)]
+    starts = np.cumsum(cells) - cells
+    centers = np.empty((int(cells.sum()), 2))
+    for patch_class in patches.classes:
+        middle = samplings[patch_class.sides].centers
+        centers[starts[patch_class.patches][:, None] + np.arange(len(middle))] = middle
+    return np.repeat(np.arange(len(sizes)), cells), centers
+
+
 def number_dense_mesh(patches: Patches, level: int) -> Numbering:
     """Numbering of the dense mesh of refinement level k."""
     topology = patches.topology
@@ -89,12 +103,15 @@ def number_dense_mesh(patches: Patches, level: int) -> Numbering:
         cells[patch_class.patches] = len(samplings[patch_class.sides].cells)
     edge_starts, patch_starts, total = _starts(patches, points, inner)
     uvs = None if patches.mesh.corner_uvs is None else patches.mesh.corner_uvs[patches.source_corners]
-    corner_wedges, base_corners, corner_repeats = _corner_wedges(patches, uvs, total)
+    colors = corner_colors(patches)
+    carried = [values for values in (uvs, colors) if values is not None]
+    attributes = np.concatenate(carried, axis=1) if carried else None
+    corner_wedges, base_corners, corner_repeats = _corner_wedges(patches, attributes, total)
     heads = topology.vertices[topology.next]
     along = topology.vertices < heads
     starts = edge_starts[topology.edge]
     strides = np.ones(len(starts), dtype=np.int64)
-    extra = _split_half_edges(patches, uvs)
+    extra = _split_half_edges(patches, attributes)
     offset = total + len(corner_repeats)
     rank, share = _ranks(topology.edge[extra])
     first = offset + inner * (np.arange(len(extra)) - rank) + rank
@@ -138,17 +155,22 @@ def _differ(rows: Floats, others: Floats) -> Bools:
     return ((rows != others) & ~(np.isnan(rows) & np.isnan(others))).any(axis=1)
 
 
-def _attributes(patches: Patches, uvs: Floats | None) -> Floats:
-    """Everything of a corner that a file stores per vertex: normal and texture coordinate."""
-    return patches.normals if uvs is None else np.concatenate([patches.normals, uvs], axis=1)
+def corner_colors(patches: Patches) -> Floats | None:
+    """Colors of the patch corners ``(C,c)``: those of the vertex that the file has there, also where it was welded."""
+    mesh = patches.mesh
+    if mesh.vertex_colors is None:
+        return None
+    return mesh.vertex_colors[mesh.face_vertices[patches.source_corners]].astype(np.float64)
 
 
-def _corner_wedges(patches: Patches, uvs: Floats | None, total: int) -> tuple[Ints, Ints, Ints]:
+def _corner_wedges(patches: Patches, carried: Floats | None, total: int) -> tuple[Ints, Ints, Ints]:
     """Wedge of each corner, base corner of each vertex, and a corner for each repeat."""
     vertices, count = patches.topology.vertices, len(patches.positions)
-    rows = _attributes(patches, uvs)
+    rows = patches.normals if carried is None else np.concatenate([patches.normals, carried], axis=1)
     base = np.full(count, len(vertices))
     np.minimum.at(base, vertices, np.arange(len(vertices)))
+    own = np.flatnonzero(patches.mesh.face_vertices[patches.source_corners] == vertices)
+    base[vertices[own[::-1]]] = own[::-1]  # rather a corner of the vertex itself than of a copy welded to it
     wedges = vertices.copy()
     other = np.flatnonzero(_differ(rows, rows[base[vertices]]))
     corners = np.zeros(0, dtype=np.int64)
@@ -165,17 +187,17 @@ def _corner_wedges(patches: Patches, uvs: Floats | None, total: int) -> tuple[In
     return wedges, base, corners
 
 
-def _split_half_edges(patches: Patches, uvs: Floats | None) -> Ints:
-    """Half-edges whose normals or texture coordinates differ from those of their edge's first half-edge, by edge."""
+def _split_half_edges(patches: Patches, carried: Floats | None) -> Ints:
+    """Half-edges whose normals or carried values differ from those of their edge's first half-edge, by edge."""
     topology = patches.topology
     first, _ = sides_of_edges(topology)
     lead = first[topology.edge]
     differs = patches.side_field != patches.side_field[lead]
-    if uvs is not None:
+    if carried is not None:
         along = (topology.forward == topology.forward[lead])[:, None]
-        start = np.where(along, uvs[lead], uvs[topology.next[lead]])
-        end = np.where(along, uvs[topology.next[lead]], uvs[lead])
-        differs |= _differ(uvs, start) | _differ(uvs[topology.next], end)
+        start = np.where(along, carried[lead], carried[topology.next[lead]])
+        end = np.where(along, carried[topology.next[lead]], carried[lead])
+        differs |= _differ(carried, start) | _differ(carried[topology.next], end)
     extra = np.flatnonzero(differs)
     return extra[np.argsort(topology.edge[extra], kind="stable")]
 

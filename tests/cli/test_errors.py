@@ -33,6 +33,7 @@ BAD = {
     "gpu": (["refine", "cube.obj", "dense.ply", "--backend", "gpu"], "no GPU backend"),
     "ascii obj": (["refine", "cube.obj", "dense.obj", "--ascii"], "--ascii"),
     "report twice": (["refine", "cube.obj", "-", "--output-format", "ply", "--report", "-"], "standard output"),
+    "report over IN": (["refine", "cube.obj", "dense.ply", "--report", "./cube.obj"], "same file"),
     "report over OUT": (["refine", "cube.obj", "dense.ply", "--report", "./dense.ply"], "same file"),
     "report nowhere": (["refine", "cube.obj", "dense.ply", "--report", "nowhere/r.json"], "nowhere/r.json"),
     "report of nothing": (["refine", "cube.obj", "dense.ply", "--report", "r.json", "--dry-run"], "--dry-run"),

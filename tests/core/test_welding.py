@@ -9,6 +9,7 @@ import pytest
 
 import curvify
 from curvify.mesh import PolygonMesh
+from curvify.sinks import ArraySink
 from surfaces import (
     CROSS_TANGENTS,
     check_sound,
@@ -139,3 +140,35 @@ def test_colors_and_normals_of_a_soup_follow_its_corners() -> None:
     assert dense.colors is not None
     assert np.array_equal(dense.colors[: mesh.vertex_count], colors)
     assert np.abs(dense.normals[: mesh.vertex_count] - unit(mesh.positions)).max() < 1e-12
+
+
+def test_colors_of_welded_copies_stay_with_their_faces() -> None:
+    mesh = soup(cube())
+    shades = np.arange(6, dtype=np.uint8) * 40
+    colors = np.repeat(shades, 4)[:, None] * np.ones(3, dtype=np.uint8)
+    dense = curvify.refine(mesh.with_(vertex_colors=colors), level=2)
+    check_sound(dense, closed=True)
+    surface = curvify.surface(mesh.with_(vertex_colors=colors))
+    sink = ArraySink()
+    surface.stream(sink, 2)
+    assert dense.source_faces is not None
+    shown = sink.records["color"][dense.face_wedges]
+    assert (shown == shades[dense.source_faces][:, None, None]).all()
+
+
+def test_an_edge_too_short_to_divide_by_is_a_point() -> None:
+    points = [[0, 0, 0], [1e-200, 0, 0], [1, 1, 0], [0, 1, 0.2], [0.5, -1, 0]]
+    dense = refined(PolygonMesh.from_faces(points, [[0, 1, 2, 3], [1, 0, 4]]), 1)
+    assert np.isfinite(dense.positions).all()
+
+
+def test_every_cell_knows_its_patch_and_where_it_lies_there() -> None:
+    mesh = on_sphere(mixed_ball())
+    surface = curvify.surface(mesh)
+    dense = surface.refine(3)
+    assert dense.source_patches is not None
+    assert dense.source_parameters is not None
+    middle, _ = surface.evaluate(dense.source_patches, dense.source_parameters)
+    corners = dense.positions[dense.faces]
+    reach = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max(axis=1)
+    assert (np.linalg.norm(middle - corners.mean(axis=1), axis=1) < 0.2 * reach).all()
