@@ -36,3 +36,9 @@ def cross(a: Floats, b: Floats, axis: int = -1) -> Floats:
         np.multiply(a[j], b[k], out=result[i])
         result[i] -= a[k] * b[j]
     return np.moveaxis(result, 0, axis)
+
+
+def unit_rows(vectors: Floats) -> Floats:
+    """Vectors ``(3,...)`` along the leading axis scaled to length 1, zero where they have none."""
+    length = np.sqrt(np.einsum("c...,c...->...", vectors, vectors))
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)

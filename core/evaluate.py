@@ -17,6 +17,7 @@ from functools import lru_cache, partial
 
 import numpy as np
 
+from curvify.arrays import unit_rows
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import unit
 from curvify.sampling import Sampling
@@ -240,7 +241,7 @@ def fill_patches(
                 normals[place[0][face], place[1].start + sample] = blended_normals(patches, ids, points)
     if patch_class.normals is not None:
         for place, values in _evaluate_form(patch_class.normals, rows, sampling.points, grid, tolerance, 1):
-            _store(normals, place, _unit_rows(values[0]))
+            _store(normals, place, unit_rows(values[0]))
 
 
 def _store(out: Floats, place: tuple[Ints, slice], values: Floats) -> None:
@@ -273,12 +274,6 @@ def _cross_normals(a: Floats, b: Floats) -> tuple[Floats, tuple[Ints, Ints] | No
     np.sqrt(square, out=square)
     normal /= square
     return normal, parallel
-
-
-def _unit_rows(vectors: Floats) -> Floats:
-    """Vectors ``(3,...)`` scaled to length 1, zero where they have none."""
-    length = np.sqrt(np.einsum("c...,c...->...", vectors, vectors))
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
 def _evaluate_form(
@@ -419,4 +414,4 @@ def edge_points(curves: Floats, t: Floats) -> Floats:
 
 def edge_normals(fields: Floats, t: Floats) -> Floats:
     """Unit normals ``(3,e,m)`` of Bezier normal fields ``(3,e,q+1)`` at ``t (m,)``."""
-    return _unit_rows(edge_points(fields, t))
+    return unit_rows(edge_points(fields, t))

@@ -31,15 +31,6 @@ class Loops:
     source_corners: Ints
     source_faces: Ints
 
-    @property
-    def sizes(self) -> Ints:
-        return np.diff(self.offsets)
-
-    @property
-    def faces(self) -> Ints:
-        """Face of each corner ``(C,)``."""
-        return np.repeat(np.arange(len(self.offsets) - 1), self.sizes)
-
 
 @dataclass(eq=False)
 class Topology:

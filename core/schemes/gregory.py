@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from curvify.arrays import cross
+from curvify.arrays import cross, unit_rows
 from curvify.errors import OptionError
 from curvify.mesh import Bools, Floats, Ints, PolygonMesh
 from curvify.prepare import prepare_mesh
@@ -231,7 +231,7 @@ def paper_tangent(sides: Sides, points: Floats, normals: Floats, options: Option
 def polygon_normal(points: Floats) -> Floats:
     """Unit mean ``(3,f)`` of the unit corner crosses of polygons ``(3,f,n)``: equation (12)."""
     ahead, behind = np.roll(points, -1, axis=2) - points, np.roll(points, 1, axis=2) - points
-    return _unit(_unit(cross(ahead, behind, axis=0)).sum(axis=2))
+    return unit_rows(unit_rows(cross(ahead, behind, axis=0)).sum(axis=2))
 
 
 def center_point(points: Floats, normals: Floats) -> Floats:
@@ -239,11 +239,11 @@ def center_point(points: Floats, normals: Floats) -> Floats:
     middle = points.mean(axis=2)
     offsets = middle[..., None] - points
     ahead = np.roll(offsets, -1, axis=2)
-    area = _unit(cross(offsets, ahead, axis=0).sum(axis=2))
+    area = unit_rows(cross(offsets, ahead, axis=0).sum(axis=2))
     total = normals.sum(axis=2)
     weak = np.sqrt(dot(total, total)) < 0.2 * points.shape[2]
-    mean = np.where(weak, area, _unit(total))
-    axis = _unit(mean + np.maximum(dot(mean, area), 0.0) ** 4 * area)
+    mean = np.where(weak, area, unit_rows(total))
+    axis = unit_rows(mean + np.maximum(dot(mean, area), 0.0) ** 4 * area)
     along = -dot(offsets, normals + axis[..., None]) / np.maximum(1 + dot(normals, axis[..., None]), 0.5)
     return middle + axis * along.mean(axis=1)
 
@@ -265,16 +265,11 @@ class NormalControls:
 
     def fields(self, t: Floats) -> Floats:
         """Unit edge normals ``(3,f,n,m)``."""
-        return _unit(bernstein(self.work.side_fields(self.corners), t))
+        return unit_rows(bernstein(self.work.side_fields(self.corners), t))
 
     def field_derivatives(self, t: Floats) -> tuple[Floats, Floats]:
         """Not needed: these normals are values."""
         raise NotImplementedError
-
-
-def _unit(vectors: Floats) -> Floats:
-    """Vectors along the leading axis scaled to length 1, zero where they have none."""
-    return _quotient(vectors, np.sqrt(dot(vectors, vectors)))
 
 
 def _quotient(a: Floats, b: Floats) -> Floats:
