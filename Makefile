@@ -24,7 +24,7 @@ demo: $(VENV)/demo.stamp
 lint: $(VENV)/test.stamp
 	$(BIN)/ruff check .
 	rm -rf build/typed && mkdir -p build/typed/curvify
-	ln -s $(CURDIR)/core/* $(CURDIR)/cli build/typed/curvify/
+	ln -s $(CURDIR)/core/* $(CURDIR)/cli $(CURDIR)/gpu build/typed/curvify/
 	MYPYPATH=build/typed $(BIN)/mypy -p curvify
 
 test: lint

@@ -16,13 +16,14 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from curvify.errors import CurvifyError, FormatError, LimitError, MeshError, OptionError
+    from curvify.errors import CurvifyError, DeviceError, FormatError, LimitError, MeshError, OptionError
     from curvify.mesh import DenseMesh, Marks, PolygonMesh
     from curvify.pieces import split_mesh
     from curvify.refinement import Surface, refine, surface
 
 _WHERE = {
     "CurvifyError": "errors",
+    "DeviceError": "errors",
     "FormatError": "errors",
     "LimitError": "errors",
     "MeshError": "errors",
@@ -39,6 +40,7 @@ _WHERE = {
 __all__ = [
     "CurvifyError",
     "DenseMesh",
+    "DeviceError",
     "FormatError",
     "LimitError",
     "Marks",

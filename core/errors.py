@@ -21,3 +21,7 @@ class OptionError(CurvifyError):
 
 class LimitError(CurvifyError):
     """The result would be larger than the limit that guards memory and disk."""
+
+
+class DeviceError(CurvifyError):
+    """There is no OpenGL device, or it cannot do what is asked for."""
