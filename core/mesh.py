@@ -31,11 +31,14 @@ def _floats(*shape: int) -> Floats:
 
 @dataclass(eq=False)
 class Marks:
-    """Features that a file asks for, by vertex and face ids as in the file (0-based).
+    """Features and shape controls, by vertex and face ids of the mesh (0-based).
 
-    ``crease_edges (M,2)`` with ``crease_sharpness (M,2)`` in 0..1 at either end (1 is fully sharp);
-    ``straight_edges (M,2)``; ``corner_vertices (M,)`` with ``corner_sharpness (M,)`` in 0..1;
-    ``flat_faces (M,)``; ``hole_faces (M,)`` are faces that only complete the topology.
+    ``crease_edges (M,2)`` with ``crease_sharpness (M,2)`` in 0..1 at either end: 1 is fully sharp, 0 smooth whatever
+    weaker sources say. ``straight_edges (M,2)``; ``bent_edges (M,2)`` with ``edge_normals (M,3)``, the directions that
+    these edges bend in; ``curled_edges (M,2)`` with ``kappas (M,)``, the crease height of ``png1``.
+    ``corner_vertices (M,)`` with ``corner_sharpness (M,)`` in 0..1; ``flat_faces (M,)``; ``hole_faces (M,)``, which
+    are left out; ``bulged_faces (M,)`` with ``bulges (M,)`` and ``full_faces (M,)`` with ``alphas (M,)``, how far
+    these faces swell. What is marked twice has the later mark.
     """
 
     crease_edges: Ints = field(default_factory=lambda: _ints(0, 2))
@@ -45,17 +48,47 @@ class Marks:
     corner_sharpness: Floats = field(default_factory=lambda: _floats(0))
     flat_faces: Ints = field(default_factory=lambda: _ints(0))
     hole_faces: Ints = field(default_factory=lambda: _ints(0))
+    bent_edges: Ints = field(default_factory=lambda: _ints(0, 2))
+    edge_normals: Floats = field(default_factory=lambda: _floats(0, 3))
+    curled_edges: Ints = field(default_factory=lambda: _ints(0, 2))
+    kappas: Floats = field(default_factory=lambda: _floats(0))
+    bulged_faces: Ints = field(default_factory=lambda: _ints(0))
+    bulges: Floats = field(default_factory=lambda: _floats(0))
+    full_faces: Ints = field(default_factory=lambda: _ints(0))
+    alphas: Floats = field(default_factory=lambda: _floats(0))
 
     def counts(self) -> dict[str, int]:
         """How many marks there are of each kind, kinds without any left out."""
         kinds = {
             "crease": self.crease_edges,
             "straight": self.straight_edges,
+            "edge normal": self.bent_edges,
+            "kappa": self.curled_edges,
             "corner": self.corner_vertices,
             "flat": self.flat_faces,
             "hole": self.hole_faces,
+            "bulge": self.bulged_faces,
+            "alpha": self.full_faces,
         }
         return {name: len(items) for name, items in kinds.items() if len(items)}
+
+    def validate(self, vertices: int, faces: int) -> None:
+        """Raise MeshError unless all marks lie on the mesh's vertices and faces and are in range."""
+        edges = (self.crease_edges, self.straight_edges, self.bent_edges, self.curled_edges)
+        ends = np.concatenate([*(pairs.reshape(-1) for pairs in edges), self.corner_vertices])
+        inner = np.concatenate([self.flat_faces, self.hole_faces, self.bulged_faces, self.full_faces])
+        for what, ids, count in (("vertex", ends, vertices), ("face", inner, faces)):
+            wrong = ids[(ids < 0) | (ids >= count)]
+            if len(wrong):
+                raise MeshError(f"a mark is on {what} {wrong[0]}, the mesh has {count} (counted from 0)")
+        for what, values in (("crease", self.crease_sharpness), ("corner", self.corner_sharpness)):
+            if not ((values >= 0) & (values <= 1)).all():
+                raise MeshError(f"the sharpness of a {what} must be from 0 to 1")
+        for what, values in (("edge normal", self.edge_normals), ("kappa", self.kappas), ("bulge", self.bulges)):
+            if not np.isfinite(values).all():
+                raise MeshError(f"the {what} of a mark must be finite")
+        if not (np.isfinite(self.alphas) & (self.alphas > 0)).all():
+            raise MeshError("the alpha of a face must be a positive number")
 
 
 @dataclass(eq=False)

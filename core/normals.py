@@ -43,7 +43,9 @@ def degrees_between(a: Floats, b: Floats) -> Floats:
     return np.degrees(2 * np.arctan2(np.linalg.norm(ua - ub, axis=-1), np.linalg.norm(ua + ub, axis=-1)))
 
 
-def corner_normals(positions: Floats, offsets: Ints, vertices: Ints, area: Floats) -> tuple[Floats, Floats]:
+def corner_normals(
+    positions: Floats, offsets: Ints, vertices: Ints, area: Floats, flat: Bools | None = None
+) -> tuple[Floats, Floats]:
     """Unit normal ``(C,3)`` and interior angle ``(C,)``, in radians, of each face at each of its corners.
 
     ``area (F,3)`` are the faces' area vectors. Triangles and quads: the cross of the two sides, turned to the side of
@@ -65,7 +67,7 @@ def corner_normals(positions: Floats, offsets: Ints, vertices: Ints, area: Float
     length = np.where(reflex, -sine, sine)
     length[straight] = 1.0
     normals = crosses / length[:, None]
-    own = straight | np.repeat(sizes > 4, sizes)
+    own = straight | np.repeat(sizes > 4 if flat is None else (sizes > 4) | flat, sizes)
     normals[own] = face_normals[own]
     return normals, angles
 
@@ -75,13 +77,15 @@ def sum_by(labels: Ints, values: Floats, count: int) -> Floats:
     return np.stack([np.bincount(labels, values[:, i], count) for i in range(3)], axis=1)
 
 
-def sector_normals(positions: Floats, offsets: Ints, vertices: Ints, area: Floats, sectors: Ints) -> Floats:
+def sector_normals(
+    positions: Floats, offsets: Ints, vertices: Ints, area: Floats, sectors: Ints, flat: Bools | None = None
+) -> Floats:
     """Computed normal of each corner's sector ``(C,3)``: the mean of its corner normals weighted by angle.
 
-    ``area (F,3)`` are the faces' area vectors, ``sectors (C,)`` labels corners by their sector. Where the sum
-    vanishes, the area normal of the largest face of the sector serves.
+    ``area (F,3)`` are the faces' area vectors, ``sectors (C,)`` labels corners by their sector, ``flat (F,)`` are
+    faces that are to be flat. Where the sum vanishes, the area normal of the largest face of the sector serves.
     """
-    normals, angles = corner_normals(positions, offsets, vertices, area)
+    normals, angles = corner_normals(positions, offsets, vertices, area, flat)
     total = sum_by(sectors, normals * angles[:, None], len(vertices))
     vanishing: Bools = np.all(np.abs(total) < 1e-9, axis=1)
     if vanishing[sectors].any():

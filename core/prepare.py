@@ -11,11 +11,14 @@ from functools import partial
 
 import numpy as np
 
-from curvify.errors import MeshError, OptionError
+from curvify.edges import edge_curves
+from curvify.errors import MeshError
+from curvify.marks import ResolvedMarks, gather_marks, hole_faces
 from curvify.mesh import Bools, Floats, Ints, PolygonMesh
-from curvify.normals import SAME_NORMAL, degrees_between, is_flat_shaded, sector_normals, unit
+from curvify.normals import SAME_NORMAL, degrees_between, is_flat_shaded, unit
+from curvify.options import MeshOptions
 from curvify.polygons import newell_normals
-from curvify.sectors import Features, resolve_features
+from curvify.sectors import Features, label_sectors, resolve_features
 from curvify.topology import (
     Loops,
     Topology,
@@ -29,8 +32,6 @@ from curvify.topology import (
 )
 from curvify.words import count_of
 
-WELD_MODES = ("auto", "always", "never")
-SHARP_SOURCES = ("auto", "normals", "none")
 #: Coordinates beyond this would overflow when they are multiplied, or in float32 files.
 LARGEST_COORDINATE = 1e30
 
@@ -40,8 +41,8 @@ class Coarse:
     """A mesh ready for a scheme.
 
     ``positions (V,3)`` as read, ``stand_in (V,)`` the vertex that each is welded to; welded ``loops``, their
-    ``topology``, area vectors ``area (F,3)`` and ``fans (C,)``; ``given (C,3)`` unit normals of the corners, or None
-    where they are to be computed.
+    ``topology``, area vectors ``area (F,3)``, ``fans (C,)`` and ``sectors (C,)``; ``given (C,3)`` unit normals of the
+    corners, zero where the file has none, or None where all are to be computed; ``marks`` resolved for these loops.
     """
 
     mesh: PolygonMesh
@@ -51,48 +52,70 @@ class Coarse:
     topology: Topology
     area: Floats
     fans: Ints
+    sectors: Ints
     given: Floats | None
-    split_by_normals: bool
+    marks: ResolvedMarks
     warnings: list[str] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
 
     def features(self, corners: Bools | None = None) -> Features:
-        """Normals and end tangents, with the vertices ``corners (V,)`` as corners."""
+        """Normals and end tangents, with the vertices ``corners (V,)`` as corners besides those that are marked."""
         if corners is None:
             corners = np.zeros(len(self.positions), dtype=bool)
         return resolve_features(
-            self.topology, self.positions, self.area, self.fans, self.given, corners, self.split_by_normals
+            self.topology, self.positions, self.area, self.fans, self.sectors, self.given, self.marks, corners
         )
 
+    def edge_curves(self, features: Features, lengths: str = "circle") -> Floats:
+        """Bezier points ``(E,4,3)`` of the mesh's edges in canonical direction; ``lengths`` as in ``edges``."""
+        start, end = self.positions[self.topology.edges.T]
+        return edge_curves(start, end, features.tangents[:, 0], features.tangents[:, 1], lengths)
 
-def prepare_mesh(mesh: PolygonMesh, weld: str = "auto", sharp_from: str = "auto") -> Coarse:
-    """Weld, clean and analyze a mesh.
 
-    ``weld``: ``auto`` closes seams between bit-equal open edges, ``always`` merges all bit-equal positions,
-    ``never`` neither. ``sharp_from``: ``auto`` takes creases from corner normals that differ, unless the file is
-    only flat-shaded; ``normals`` takes them in any case; ``none`` averages them away.
-    Raises MeshError where there is nothing to refine, OptionError for unknown words.
+def prepare_mesh(mesh: PolygonMesh, options: MeshOptions | None = None) -> Coarse:
+    """Weld, clean and analyze a mesh, and weigh its marks.
+
+    Raises MeshError where there is nothing to refine.
     """
-    if weld not in WELD_MODES:
-        raise OptionError(f"weld must be one of {', '.join(WELD_MODES)}, not {weld!r}")
-    if sharp_from not in SHARP_SOURCES:
-        raise OptionError(f"sharp_from must be one of {', '.join(SHARP_SOURCES)}, not {sharp_from!r}")
+    options = options or MeshOptions()
     mesh.validate()
     positions = np.ascontiguousarray(mesh.positions, dtype=np.float64)
     _check_extent(positions, mesh)
-    stand_in = weld_vertices(positions, mesh.face_offsets, mesh.face_vertices, weld)
+    if options.marks is not None:
+        options.marks.validate(mesh.vertex_count, mesh.face_count)
+    stand_in = weld_vertices(positions, mesh.face_offsets, mesh.face_vertices, options.weld)
     loops = clean_loops(mesh.face_offsets, stand_in[mesh.face_vertices])
+    holes = hole_faces(mesh, options)
+    dropped = np.flatnonzero(np.bincount(loops.source_faces, minlength=mesh.face_count) == 0)
+    if holes.any():
+        loops = _without_faces(loops, holes)
     if not len(loops.source_faces):
-        raise MeshError("every face has fewer than 3 distinct corners; there is nothing to refine")
+        raise MeshError(
+            "every face is a hole; there is nothing to refine"
+            if holes.all()
+            else "every face has fewer than 3 distinct corners; there is nothing to refine"
+        )
     topology = build_topology(positions, loops.offsets, loops.vertices)
     area = newell_normals(positions, loops.offsets, loops.vertices)
-    coarse = Coarse(
-        mesh, positions, stand_in, loops, topology, area, fans(topology), None, sharp_from != "none"
-    )
+    given = _given_normals(mesh, loops, topology, area, options.sharp_from)
+    marks, notes = gather_marks(mesh, options, topology, loops, stand_in, area, given.normals)
+    around = fans(topology)
+    sectors = label_sectors(topology, around, marks.crease)
+    coarse = Coarse(mesh, positions, stand_in, loops, topology, area, around, sectors, given.normals, marks)
+    coarse.counts["hole_faces"] = int(holes.sum())
     coarse.warnings += mesh.warnings
-    _note_topology(coarse, int((stand_in != np.arange(len(stand_in))).sum()))
-    coarse.given = _given_normals(coarse, sharp_from)
+    _note_topology(coarse, int((stand_in != np.arange(len(stand_in))).sum()), dropped)
+    coarse.warnings += given.notes + notes
     return coarse
+
+
+def _without_faces(loops: Loops, holes: Bools) -> Loops:
+    """The loops without those of the mesh's faces ``holes (F,)``."""
+    kept = ~holes[loops.source_faces]
+    sizes = np.diff(loops.offsets)
+    corners = np.repeat(kept, sizes)
+    offsets = np.concatenate([[0], np.cumsum(sizes[kept])])
+    return Loops(offsets, loops.vertices[corners], loops.source_corners[corners], loops.source_faces[kept])
 
 
 def _check_extent(positions: Floats, mesh: PolygonMesh) -> None:
@@ -109,8 +132,8 @@ def _check_extent(positions: Floats, mesh: PolygonMesh) -> None:
         raise MeshError(f"the mesh is only {span:.3g} across; scale it above {1 / LARGEST_COORDINATE:.0e}")
 
 
-def _note_topology(coarse: Coarse, welded: int) -> None:
-    """Warnings and counts about the connectivity."""
+def _note_topology(coarse: Coarse, welded: int, dropped: Ints) -> None:
+    """Warnings and counts about the connectivity; ``dropped`` are faces without three distinct corners."""
     mesh, loops, topology = coarse.mesh, coarse.loops, coarse.topology
     counts, warnings = coarse.counts, coarse.warnings
     used = np.zeros(mesh.vertex_count, dtype=bool)
@@ -124,13 +147,12 @@ def _note_topology(coarse: Coarse, welded: int) -> None:
         nonmanifold_edges=int(topology.nonmanifold.sum()),
         unreferenced_vertices=int((~used).sum()),
         welded_vertices=welded,
-        dropped_faces=mesh.face_count - len(loops.source_faces),
+        dropped_faces=len(dropped),
         vertices_with_several_fans=int((np.bincount(fan_vertices, minlength=mesh.vertex_count) > 1).sum()),
     )
-    if counts["dropped_faces"]:
-        gone = np.flatnonzero(np.bincount(loops.source_faces, minlength=mesh.face_count) == 0)[0]
+    if len(dropped):
         warnings.append(
-            f"{count_of(counts['dropped_faces'], 'face')} with fewer than 3 distinct corners dropped, first: {gone}"
+            f"{count_of(len(dropped), 'face')} with fewer than 3 distinct corners dropped, first: {dropped[0]}"
         )
     if counts["nonmanifold_edges"]:
         a, b = topology.edges[np.flatnonzero(topology.nonmanifold)[0]]
@@ -148,9 +170,6 @@ def _note_topology(coarse: Coarse, welded: int) -> None:
     volume = partial(signed_volume, coarse.positions, loops.offsets, loops.vertices, coarse.area)
     if is_closed(topology) and volume() < 0:
         warnings.append("the mesh is closed and inside out: its faces run clockwise seen from outside")
-    if mesh.marks.counts():
-        found = ", ".join(f"{n} {kind}" for kind, n in mesh.marks.counts().items())
-        warnings.append(f"the file has marks ({found}) that this version does not use yet")
 
 
 def _without_area(coarse: Coarse) -> Bools:
@@ -162,30 +181,32 @@ def _without_area(coarse: Coarse) -> Bools:
     return np.linalg.norm(coarse.area, axis=1) <= 1e-12 * longest
 
 
-def _given_normals(coarse: Coarse, sharp_from: str) -> Floats | None:
-    """Unit corner normals of the file on the cleaned loops, gaps filled; None where they say nothing."""
-    normals = coarse.mesh.corner_normals
-    if normals is None:
-        return None
-    loops, topology = coarse.loops, coarse.topology
-    given = np.nan_to_num(normals[loops.source_corners], posinf=0.0, neginf=0.0)
+@dataclass(frozen=True, eq=False)
+class GivenNormals:
+    """Unit ``normals (C,3)`` of the loops' corners, zero where the file has none; None where they say nothing."""
+
+    normals: Floats | None
+    notes: list[str]
+
+
+def _given_normals(
+    mesh: PolygonMesh, loops: Loops, topology: Topology, area: Floats, sharp_from: str
+) -> GivenNormals:
+    """The normals of the file, unless they only repeat its flat faces, and what there is to say about them."""
+    if mesh.corner_normals is None:
+        return GivenNormals(None, [])
+    given = np.nan_to_num(mesh.corner_normals[loops.source_corners], posinf=0.0, neginf=0.0)
     given = unit(given / np.maximum(np.abs(given).max(axis=1, keepdims=True), 1e-300))
     present = given.any(axis=1)
     if not present.any():
-        return None
-    flat = present.all() and is_flat_shaded(given, loops.offsets, coarse.area, corner_links(topology))
-    if flat and sharp_from == "auto":
-        if _normals_differ(topology, given):
-            coarse.warnings.append(
-                "the file's normals only repeat its flat faces and are ignored; keep them with --sharp-from normals"
-            )
-        return None
-    if not present.all():
-        computed = sector_normals(coarse.positions, loops.offsets, loops.vertices, coarse.area, coarse.fans)
-        given[~present] = computed[~present]
-        missing = count_of(int((~present).sum()), "corner")
-        coarse.warnings.append(f"{missing} without a normal in the file, computed from the faces")
-    return given
+        return GivenNormals(None, [])
+    if sharp_from != "normals" and present.all():
+        if is_flat_shaded(given, loops.offsets, area, corner_links(topology)):
+            note = "the file's normals only repeat its flat faces and are ignored; keep them with --sharp-from normals"
+            return GivenNormals(None, [note] if _normals_differ(topology, given) else [])
+    missing = int((~present).sum())
+    note = f"{count_of(missing, 'corner')} without a normal in the file, computed from the faces"
+    return GivenNormals(given, [note] if missing else [])
 
 
 def _normals_differ(topology: Topology, normals: Floats) -> bool:

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from curvify.arrays import cross
-from curvify.edges import LEAST_ADVANCE, bending_normals, smooth_tangents
+from curvify.arrays import cross, distinct
+from curvify.edges import ALONG, LEAST_ADVANCE, bending_normals, smooth_tangents
+from curvify.marks import ResolvedMarks
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import SAME_NORMAL, degrees_between, dot, perpendicular, sector_normals, sum_by, unit
 from curvify.topology import Topology, components, corner_links
@@ -21,6 +22,12 @@ from curvify.topology import Topology, components, corner_links
 #: The largest turn of a line at a vertex where it still runs on smoothly (degrees).
 BOUNDARY_TURN = 75.0
 CREASE_TURN = 100.0
+
+
+#: Straight edges at a vertex whose directions span less than this (the square of an angle) are one line, or one plane.
+ONE_LINE = 1e-14
+#: Normals of a crease's two sides whose cross product is shorter than this do not tell where the crease runs.
+NO_TURN = 1e-7
 
 
 @dataclass(eq=False)
@@ -41,47 +48,161 @@ class Features:
     adjusted: int
 
 
+def label_sectors(topology: Topology, fans: Ints, crease: Floats) -> Ints:
+    """Sector label ``(C,)`` of each corner: corners of a vertex joined across edge ends that are no crease.
+
+    ``crease (E,2)`` is the sharpness at the ends of the edges. One crease alone parts nothing: it ends in a dart.
+    """
+    if not crease.any():
+        return fans
+    one = np.flatnonzero(topology.twin > np.arange(len(topology.twin)))
+    edges, start = topology.edge[one], np.where(topology.forward[one], 0, 1)
+    smooth = np.concatenate([crease[edges, start], crease[edges, 1 - start]]) == 0
+    a, b = corner_links(topology)
+    return components(len(topology.vertices), a[smooth], b[smooth])
+
+
 def resolve_features(
     topology: Topology,
     positions: Floats,
     area: Floats,
     fans: Ints,
+    sectors: Ints,
     given: Floats | None,
+    marks: ResolvedMarks,
     corners: Bools,
-    split_by_normals: bool = True,
 ) -> Features:
-    """Resolve normals and tangents from ``given (C,3)`` unit corner normals, or from the faces where None.
+    """Resolve normals and tangents from the ``given (C,3)`` unit corner normals and the marks.
 
-    ``area (F,3)`` are the faces' area vectors, ``fans (C,)`` the fan of each corner. ``corners (V,)`` are vertices
-    that must be corners; given normals that differ make creases only if ``split_by_normals``, else they are averaged.
+    ``area (F,3)`` are the faces' area vectors, ``fans`` and ``sectors (C,)`` label the corners. Rows of ``given`` are
+    zero where the normal is to be computed; None: everywhere. ``corners (V,)`` are vertices that must be corners.
     """
-    sectors = fans if given is None or not split_by_normals else _sectors(topology, given)
-    if given is None:
-        normals = sector_normals(positions, topology.offsets, topology.vertices, area, sectors)
-    else:
-        normals = unit(sum_by(sectors, given, len(sectors)))[sectors]
+    normals, computed = _starting_normals(topology, positions, area, sectors, given, marks)
     sharp = _sharp_ends(topology, sectors)
-    lines, turned = _line_tangents(topology, positions, sharp)
+    lines, turned = _line_tangents(topology, positions, sharp, marks.straight)
     tangled = _touched(topology, topology.nonmanifold)
     lined = lines.any(axis=1)
-    corners = corners | (tangled & ~lined)
-    if given is None:
-        corners = corners | turned
-    straighten = (lined & ~corners & (tangled | (given is None)))[topology.vertices]
+    corners = corners | (tangled & ~lined) | (marks.corner > 0)
+    own = np.ones(len(lined), dtype=bool)
+    own[topology.vertices[~computed]] = False
+    corners |= turned & own
+    # Where a crease runs into a rim, no plane holds both: the rim turns there.
+    crossed = ~topology.interior[topology.edge] & _touched(topology, sharp.any(axis=1))[topology.vertices]
+    lined[topology.vertices[crossed]] &= tangled[topology.vertices[crossed]]
+    straighten = (lined & ~corners)[topology.vertices] & (tangled[topology.vertices] | computed)
     if straighten.any():
         t = lines[topology.vertices[straighten]]
         old = normals[straighten]
         normals[straighten] = unit(old - dot(old, t) * t)
-    tangents, bending = _end_tangents(topology, positions, area, normals, lines, sharp, corners)
+    straight = _straight_planes(topology, positions, sectors, marks.straight, np.where(corners[:, None], 0.0, lines))
+    corners |= straight.torn
+    straight.apply(normals)
+    if ((marks.crease > 0) & (marks.crease < 1)).any():
+        _soften(topology, normals, fans, sectors, sharp, marks.crease)
+        straight.apply(normals)
+    tangents, bending = _end_tangents(topology, positions, area, normals, lines, sharp, corners, marks)
     normals, adjusted = _fit_normals(topology, normals, tangents, corners)
     return Features(normals, tangents, bending, sharp, corners, adjusted)
 
 
-def _sectors(topology: Topology, given: Floats) -> Ints:
-    """Sector label of each corner: corners joined across the edge ends where their normals are one."""
-    a, b = corner_links(topology)
-    smooth = degrees_between(given[a], given[b]) <= SAME_NORMAL
-    return components(len(topology.vertices), a[smooth], b[smooth])
+def _starting_normals(
+    topology: Topology, positions: Floats, area: Floats, sectors: Ints, given: Floats | None, marks: ResolvedMarks
+) -> tuple[Floats, Bools]:
+    """Normal ``(C,3)`` of each corner's sector, and where it is computed ``(C,)`` rather than given.
+
+    A sector beside a mark that parts faces whose given normals agree, or in a flat face, gets a computed one.
+    """
+    everywhere = np.ones(len(sectors), dtype=bool)
+    if given is None:
+        return sector_normals(positions, topology.offsets, topology.vertices, area, sectors, marks.flat), everywhere
+    normals = unit(sum_by(sectors, given, len(sectors)))[sectors]
+    wanted = np.zeros(len(sectors), dtype=bool)
+    wanted[sectors[~normals.any(axis=1)]] = True
+    wanted[sectors[np.repeat(marks.flat, topology.sizes)]] = True
+    if marks.crease.any():
+        a, b = corner_links(topology)
+        apart = sectors[a] != sectors[b]
+        a, b = a[apart], b[apart]
+        alike = degrees_between(normals[a], normals[b]) <= SAME_NORMAL
+        wanted[sectors[a[alike]]] = True
+        wanted[sectors[b[alike]]] = True
+    computed = wanted[sectors]
+    if computed.any():
+        own = sector_normals(positions, topology.offsets, topology.vertices, area, sectors, marks.flat)
+        normals[computed] = own[computed]
+    return normals, computed
+
+
+@dataclass(eq=False)
+class StraightPlanes:
+    """Sectors with straight edges: their normals must be perpendicular to those.
+
+    ``corners (c,)`` and the row ``which (c,)`` of each; ``rank (s,)`` 1 for one direction, 2 for a plane; ``axis
+    (s,3)`` that direction, or the normal of the plane. ``torn (V,)``: vertices whose straight edges span space.
+    """
+
+    corners: Ints
+    which: Ints
+    rank: Ints
+    axis: Floats
+    torn: Bools
+
+    def apply(self, normals: Floats) -> None:
+        """Make the normals ``(C,3)`` of these sectors perpendicular to their straight edges, in place."""
+        if not len(self.corners):
+            return
+        old, axis, rank = normals[self.corners], self.axis[self.which], self.rank[self.which][:, None]
+        flattened = unit(old - dot(old, axis) * axis)
+        upright = axis * np.where(dot(old, axis) < 0, -1.0, 1.0)
+        normals[self.corners] = np.where(rank == 1, flattened, np.where(rank == 2, upright, old))
+
+
+def _straight_planes(
+    topology: Topology, positions: Floats, sectors: Ints, straight: Bools, lines: Floats
+) -> StraightPlanes:
+    """Directions of the straight edges in each sector, with the line ``lines (V,3)`` through its vertex."""
+    torn = np.zeros(topology.vertex_count, dtype=bool)
+    half_edges = np.flatnonzero(straight[topology.edge])
+    if not len(half_edges):
+        none = np.zeros(0, dtype=np.int64)
+        return StraightPlanes(none, none, none, np.zeros((0, 3)), torn)
+    chord = unit(positions[topology.vertices[topology.next[half_edges]]] - positions[topology.vertices[half_edges]])
+    at = np.concatenate([half_edges, topology.next[half_edges]])
+    labels, which = distinct(sectors[at])
+    spread = np.zeros((len(labels), 3, 3))
+    np.add.at(spread, which, np.tile(chord[:, :, None] * chord[:, None, :], (2, 1, 1)))
+    through = lines[topology.vertices[labels]]
+    spread += through[:, :, None] * through[:, None, :]
+    size, axes = np.linalg.eigh(spread)
+    rank = (size > ONE_LINE * size[:, 2:]).sum(axis=1)
+    torn[topology.vertices[labels[rank == 3]]] = True
+    axis = np.where(rank[:, None] == 1, axes[:, :, 2], axes[:, :, 0])
+    row = np.full(len(sectors), -1)
+    row[labels] = np.arange(len(labels))
+    corners = np.flatnonzero(row[sectors] >= 0)
+    return StraightPlanes(corners, row[sectors[corners]], rank, axis, torn)
+
+
+def _soften(
+    topology: Topology, normals: Floats, fans: Ints, sectors: Ints, sharp: Bools, crease: Floats
+) -> None:
+    """Move the normals of a vertex's sectors towards their mean by what its sharpest crease lacks, in place.
+
+    Replaces (16), (17): with two sectors the cross product of their normals, along which the crease runs, keeps its
+    direction.
+    """
+    half_edges = np.arange(len(topology.edge))
+    start = np.where(topology.forward, 0, 1)
+    sharpness = np.where(sharp, crease, 0.0)
+    most = np.zeros(len(sectors))
+    np.maximum.at(most, fans, sharpness[topology.edge, start])
+    np.maximum.at(most, fans[topology.next], sharpness[topology.edge, 1 - start])
+    most = most[fans]
+    soft = (most > 0) & (most < 1)
+    first = half_edges == sectors
+    mean = unit(sum_by(fans[first], normals[first], len(fans)))[fans[soft]]
+    g = most[soft, None]
+    normals[soft] = unit((1 - g) * mean + g * normals[soft])
 
 
 def _sharp_ends(topology: Topology, sectors: Ints) -> Bools:
@@ -101,11 +222,12 @@ def _touched(topology: Topology, edges: Bools) -> Bools:
     return touched
 
 
-def _line_tangents(topology: Topology, positions: Floats, sharp: Bools) -> tuple[Floats, Bools]:
+def _line_tangents(topology: Topology, positions: Floats, sharp: Bools, straight: Bools) -> tuple[Floats, Bools]:
     """Tangent ``(V,3)`` of the line through each vertex, zero where none, and where a crease turns too much.
 
     A line passes where exactly two boundary edges meet (and more than one face), or exactly two creases and
-    no boundary: the tangent of the circle through the vertex and its two neighbors on the line.
+    no boundary: the tangent of the circle through the vertex and its two neighbors on the line. Where one of its
+    edges is straight, the line goes on along it; two straight ones that turn are no line.
     """
     count = topology.vertex_count
     boundary = np.repeat(~topology.interior[:, None], 2, axis=1)
@@ -118,12 +240,15 @@ def _line_tangents(topology: Topology, positions: Floats, sharp: Bools) -> tuple
     at, away = topology.edges[end], topology.edges[:, ::-1][end]
     order = np.lexsort((away, at))
     vertex, (p, q) = at[order][::2], away[order].reshape(-1, 2).T
+    rigid = np.repeat(straight[:, None], 2, axis=1)[end][order].reshape(-1, 2).T
     before, after = positions[vertex] - positions[p], positions[q] - positions[vertex]
     turn = degrees_between(before, after)
     lines = np.zeros((count, 3))
     smooth = turn <= np.where(on_rim[vertex], BOUNDARY_TURN, CREASE_TURN)
-    circle = unit(before / dot(before, before) + after / dot(after, after))
-    lines[vertex[smooth]] = circle[smooth]
+    smooth &= ~rigid.all(axis=0) | (turn < np.degrees(np.sqrt(ONE_LINE)))
+    circle = before / dot(before, before) + after / dot(after, after)
+    tangent = unit(np.where(rigid[0][:, None], before, np.where(rigid[1][:, None], after, circle)))
+    lines[vertex[smooth]] = tangent[smooth]
     turned = np.zeros(count, dtype=bool)
     turned[vertex[~smooth & on_crease[vertex]]] = True
     return lines, turned
@@ -146,6 +271,7 @@ def _end_tangents(
     lines: Floats,
     sharp: Bools,
     corners: Bools,
+    marks: ResolvedMarks,
 ) -> tuple[Floats, Floats]:
     """Unit tangents ``(E,2,3)`` and bending normals ``(E,3)`` of all edges."""
     chord = positions[topology.edges[:, 1]] - positions[topology.edges[:, 0]]
@@ -153,25 +279,50 @@ def _end_tangents(
     mean = end_normals(topology, normals, first)
     several = np.flatnonzero(sharp.any(axis=1) | topology.nonmanifold)
     one, other = mean[several], end_normals(topology, normals, last[several])
-    mean[several] = np.where((one == other).all(axis=2, keepdims=True), one, unit(one + other))
+    mean[several] = np.where((one == other).all(axis=2, keepdims=True), one, (one + other) / 2)
     faces = topology.faces
     bending = bending_normals(chord, mean[:, 0], mean[:, 1], area[faces[first]] + area[faces[last]])
+    mean[several] = unit(mean[several])
+    bent = np.flatnonzero(marks.edge_normals.any(axis=1))
+    bending[bent] = _marked_bending(marks.edge_normals[bent], bending[bent], chord[bent])
+    pointed, weight = _points(topology, sharp, marks.corner)
     tangents = np.empty((len(chord), 2, 3))
     for end in (0, 1):
+        at = topology.edges[:, end]
         tangents[:, end] = smooth_tangents(chord, mean[:, end], bending)
         split = np.flatnonzero(sharp[several, end])
         rows = several[split]
         along = unit(chord[rows])
         tangents[rows, end] = _crease_tangents(
-            along, one[split, end], other[split, end], mean[rows, end], lines[topology.edges[rows, end]]
+            along, one[split, end], other[split, end], mean[rows, end], lines[at[rows]]
         )
-        rim = np.flatnonzero(~topology.interior & lines[topology.edges[:, end]].any(axis=1))
-        line = lines[topology.edges[rim, end]]
+        rim = np.flatnonzero(~topology.interior & lines[at].any(axis=1))
+        line = lines[at[rim]]
         line *= np.where(dot(line, chord[rim]) < 0, -1.0, 1.0)
         tangents[rim, end] = unit(line - dot(line, mean[rim, end]) * mean[rim, end])
-        straight = corners[topology.edges[:, end]] & (sharp[:, end] | ~topology.interior)
-        tangents[straight, end] = unit(chord[straight])
+        stiff = np.flatnonzero(pointed[at] | (corners[at] & (sharp[:, end] | ~topology.interior)))
+        share, along = weight[at[stiff], None], unit(chord[stiff])
+        tangents[stiff, end] = unit((1 - share) * tangents[stiff, end] + share * along)
+    tangents[marks.straight] = unit(chord[marks.straight])[:, None]
     return tangents, bending
+
+
+def _points(topology: Topology, sharp: Bools, marked: Floats) -> tuple[Bools, Floats]:
+    """Corner vertices all of whose edges leave along their chords ``(V,)``, and the share of the chords ``(V,)``.
+
+    Those marked with a sharpness ``(V,)`` that fewer than two creases or boundaries run into: the tip of a cone.
+    """
+    line = sharp | ~topology.interior[:, None]
+    lines = np.bincount(topology.edges[line], minlength=topology.vertex_count)
+    return (marked > 0) & (lines < 2), np.where(marked > 0, marked, 1.0)
+
+
+def _marked_bending(marked: Floats, own: Floats, chord: Floats) -> Floats:
+    """Marked edge normals ``(k,3)``, or the edges' own where a mark lies along its edge."""
+    along = unit(chord)
+    across = marked - dot(marked, along) * along
+    weak = np.linalg.norm(across, axis=1, keepdims=True) < ALONG * np.linalg.norm(marked, axis=1, keepdims=True)
+    return np.where(weak, own, marked)
 
 
 def end_normals(topology: Topology, normals: Floats, half_edges: Ints) -> Floats:
@@ -182,10 +333,16 @@ def end_normals(topology: Topology, normals: Floats, half_edges: Ints) -> Floats
 
 
 def _crease_tangents(along: Floats, left: Floats, right: Floats, mean: Floats, line: Floats) -> Floats:
-    """Tangent ``(k,3)`` where two normals meet: their common perpendicular, towards the line or the edge."""
+    """Tangent ``(k,3)`` where two normals meet: their common perpendicular, towards the line or the edge.
+
+    Where the normals agree, as on a crease in a flat place, the line itself.
+    """
     line = line * np.where(dot(line, along) < 0, -1.0, 1.0)
-    guide = np.where(line.any(axis=1, keepdims=True), line, along)
-    across = unit(cross(left, right))
+    has_line = line.any(axis=1, keepdims=True)
+    guide = np.where(has_line, line, along)
+    across = cross(left, right)
+    turn = np.linalg.norm(across, axis=1, keepdims=True)
+    across = np.where(has_line & (turn < NO_TURN), line, unit(across))
     tangent = across * np.where(dot(across, guide) < 0, -1.0, 1.0)
     projected = unit(along - dot(along, mean) * mean)
     return np.where(dot(tangent, along) < LEAST_ADVANCE, projected, tangent)

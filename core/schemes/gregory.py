@@ -15,6 +15,7 @@ import numpy as np
 from curvify.arrays import cross, unit_rows
 from curvify.errors import OptionError
 from curvify.mesh import Bools, Floats, Ints, PolygonMesh
+from curvify.options import MeshOptions
 from curvify.prepare import prepare_mesh
 from curvify.sampling import kite_sampling
 from curvify.schemes.base import Basis, Form, PatchClass, Patches, bernstein
@@ -36,20 +37,20 @@ normals = NORMALS
 
 
 @dataclass(frozen=True)
-class Options:
-    """``cross_tangent``: how fast patches leave their sides; ``alpha`` > 0 the fullness of ``quadratic``;
-    ``normals``: ``exact`` or the ``paper``'s approximation; ``weld``, ``sharp_from`` as in ``prepare_mesh``;
-    ``split_rule`` for concave faces.
+class Options(MeshOptions):
+    """``cross_tangent``: how fast patches leave their sides; ``alpha`` > 0 the fullness of ``quadratic``, ``bulge``
+    of ``precise`` and ``smooth``; ``normals``: ``exact`` or the ``paper``'s approximation; ``split_rule`` for concave
+    faces. The others are those of all schemes.
     """
 
     cross_tangent: str = "precise"
     alpha: float = 1.0
+    bulge: float = 0.0
     normals: str = "exact"
-    weld: str = "auto"
-    sharp_from: str = "auto"
     split_rule: str = "best"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.cross_tangent not in CROSS_TANGENTS:
             raise OptionError(f"cross_tangent must be one of {', '.join(CROSS_TANGENTS)}, not {self.cross_tangent!r}")
         if self.normals not in NORMALS:
@@ -60,6 +61,10 @@ class Options:
             )
         if self.alpha != 1.0 and self.cross_tangent != "quadratic":
             raise OptionError("alpha shapes the cross tangent 'quadratic' only; give --cross-tangent quadratic with it")
+        if not np.isfinite(self.bulge):
+            raise OptionError(f"bulge must be a finite number, not {self.bulge}")
+        if self.bulge and self.cross_tangent not in ("precise", "smooth"):
+            raise OptionError("bulge shapes the cross tangents 'precise' and 'smooth'; 'quadratic' has alpha for it")
 
     @property
     def tangent_lengths(self) -> str:
@@ -70,15 +75,16 @@ class Options:
 def prepare(mesh: PolygonMesh, options: Options | None = None) -> Patches:
     """Patches for every face of the mesh. Raises MeshError where there is nothing to refine."""
     options = options or Options()
-    coarse = prepare_mesh(mesh, options.weld, options.sharp_from)
+    coarse = prepare_mesh(mesh, options)
 
     def inward(work: Patchwork, corners: Ints) -> CrossTangent:
         points, sides = patch_sides(work, corners)
         if options.cross_tangent in ("precise", "smooth"):  # their fullness does not change the side
             return ProjectedBlend(sides, options.cross_tangent, np.zeros(corners.shape))
-        return paper_tangent(sides, points, work.corner_normals(corners), options)
+        return paper_tangent(sides, points, side_normals(work, corners), options.cross_tangent, np.ones(len(corners)))
 
     work = build_patchwork(coarse, options.tangent_lengths, options.split_rule, inward)
+    shape = face_shapes(work, options)
     classes = []
     for sides, patches in work.size_classes():
         corners = work.topology.offsets[patches][:, None] + np.arange(sides)
@@ -86,7 +92,7 @@ def prepare(mesh: PolygonMesh, options: Options | None = None) -> Patches:
         for group in (False, True):
             rows = np.flatnonzero(uneven == group)
             if len(rows):
-                classes.append(_patch_class(work, patches[rows], corners[rows], group, options))
+                classes.append(_patch_class(work, shape, patches[rows], corners[rows], group, options))
     return work.patches(classes, kite_sampling)
 
 
@@ -99,13 +105,33 @@ def is_uneven(points: Floats) -> Bools:
     return lengths.max(axis=1) > LARGE_SHARE * lengths.sum(axis=1)
 
 
-def _patch_class(work: Patchwork, patches: Ints, corners: Ints, uneven: bool, options: Options) -> PatchClass:
+@dataclass(frozen=True, eq=False)
+class FaceShapes:
+    """How far each patch swells: ``bulge (P,)`` and ``alpha (P,)``."""
+
+    bulge: Floats
+    alpha: Floats
+
+
+def face_shapes(work: Patchwork, options: Options) -> FaceShapes:
+    """The options, but for faces with a mark of their own."""
+    marks, source = work.coarse.marks, work.split.source_faces
+    bulge = np.where(np.isnan(marks.bulge), options.bulge, marks.bulge)
+    alpha = np.where(np.isnan(marks.alpha), options.alpha, marks.alpha)
+    return FaceShapes(bulge[source], alpha[source])
+
+
+def _patch_class(
+    work: Patchwork, shape: FaceShapes, patches: Ints, corners: Ints, uneven: bool, options: Options
+) -> PatchClass:
     corrected = options.cross_tangent == "precise"
     sides = corners.shape[1]
     surface = Form(
         ("gregory", sides, corrected, uneven),
         partial(_surface_basis, sides, corrected, uneven),
-        lambda rows: GregoryControls.build(work, corners[rows], uneven, options),
+        lambda rows: GregoryControls.build(
+            work, corners[rows], uneven, options.cross_tangent, shape.bulge[patches[rows]], shape.alpha[patches[rows]]
+        ),
     )
     if options.normals == "exact":
         return PatchClass(sides, patches, surface)
@@ -142,10 +168,12 @@ class GregoryControls:
         return self.tangent.field_derivatives(t)
 
     @classmethod
-    def build(cls, work: Patchwork, corners: Ints, uneven: bool, options: Options) -> GregoryControls:
-        """Controls of the patches with the given corners ``(f,n)``."""
+    def build(
+        cls, work: Patchwork, corners: Ints, uneven: bool, kind: str, bulge: Floats, alpha: Floats
+    ) -> GregoryControls:
+        """Controls of the patches with the given corners ``(f,n)``, ``bulge`` and ``alpha (f,)``."""
         n = corners.shape[1]
-        points, tangent, target = cross_tangents(work, corners, options)
+        points, tangent, target = cross_tangents(work, corners, kind, bulge, alpha)
         t = np.array([0.0, 0.5, 1.0])
         value, slope = tangent.field_derivatives(t)
         curves = tangent.sides.curves
@@ -167,17 +195,29 @@ class GregoryControls:
 
 
 def cross_tangents(
-    work: Patchwork, corners: Ints, options: Options
+    work: Patchwork, corners: Ints, kind: str, bulge: Floats, alpha: Floats
 ) -> tuple[Floats, CrossTangent, Floats | None]:
     """Corner points ``(3,f,n)``, cross tangents and, for ``precise``, the center point ``(3,f)`` of patches."""
     points, sides = patch_sides(work, corners)
-    if options.cross_tangent == "smooth":
-        return points, smooth_tangent(sides), None
-    normals = work.corner_normals(corners)
-    if options.cross_tangent == "precise":
-        target = center_point(points, normals)
+    if kind == "smooth":
+        return points, smooth_tangent(sides, bulge), None
+    if kind == "precise":
+        target = center_point(points, work.corner_normals(corners), bulge)
         return points, precise_tangent(sides, target), target
-    return points, paper_tangent(sides, points, normals, options), None
+    return points, paper_tangent(sides, points, side_normals(work, corners), kind, alpha), None
+
+
+def side_normals(work: Patchwork, corners: Ints) -> Floats:
+    """Normals ``(3,f,n)`` of the sides of patches with corners ``(f,n)``: marked ones, or the mean of their ends'."""
+    normals = work.corner_normals(corners)
+    means = (normals + np.roll(normals, -1, axis=2)) / 2
+    marked = work.coarse.marks.edge_normals
+    if marked.any():
+        edge = work.topology.edge[corners]
+        own = np.where((edge < len(marked))[..., None], marked[np.minimum(edge, len(marked) - 1)], 0.0)
+        own = np.moveaxis(own, -1, 0)
+        means = np.where(own.any(axis=0), own, means)
+    return means
 
 
 def patch_sides(work: Patchwork, corners: Ints) -> tuple[Floats, Sides]:
@@ -206,24 +246,26 @@ def precise_tangent(sides: Sides, target: Floats) -> ProjectedBlend:
     return ProjectedBlend(sides, "precise", np.clip(gain, -0.5, 1.0))
 
 
-def smooth_tangent(sides: Sides) -> ProjectedBlend:
-    """``smooth``: fullness K from what the projection takes away in the middle of each side."""
+def smooth_tangent(sides: Sides, bulge: Floats) -> ProjectedBlend:
+    """``smooth``: fullness K from what the projection takes away in the middle of each side, and ``bulge (f,)``."""
     n = sides.start.shape[2]
     middle = ProjectedBlend(sides, "smooth", np.zeros(sides.start.shape[1:])).blend(np.array([0.5]))[..., 0]
     mean = (np.sqrt(dot(sides.start, sides.start)) + np.sqrt(dot(sides.end, sides.end))) / 2
     kept = _quotient(dot(middle, middle), mean**2)
     share = 0.5 if n <= 4 else 1.0
-    return ProjectedBlend(sides, "smooth", share * np.clip((1 - kept) / 2, 0.0, 0.2))
+    return ProjectedBlend(sides, "smooth", share * np.clip((1 - kept) / 2, 0.0, 0.2) + bulge[:, None])
 
 
-def paper_tangent(sides: Sides, points: Floats, normals: Floats, options: Options) -> PaperTangent:
-    """``linear`` and ``quadratic`` (equations (8) and (9)): n_int through the neighboring edges' normals."""
-    edge = (normals + np.roll(normals, -1, axis=2)) / 2
-    first, last = np.roll(edge, 1, axis=2), np.roll(edge, -1, axis=2)
-    if options.cross_tangent == "linear":
+def paper_tangent(sides: Sides, points: Floats, across: Floats, kind: str, alpha: Floats) -> PaperTangent:
+    """``linear`` and ``quadratic`` (equations (8) and (9)): n_int through the neighboring sides' normals.
+
+    ``across (3,f,n)`` are the normals of the sides, ``alpha (f,)`` the fullness of ``quadratic``.
+    """
+    first, last = np.roll(across, 1, axis=2), np.roll(across, -1, axis=2)
+    if kind == "linear":
         guides = np.stack([first, last], axis=-1)
     else:
-        middle = options.alpha * polygon_normal(points)[..., None]
+        middle = alpha[:, None] * polygon_normal(points)[..., None]
         guides = np.stack([first, 2 * middle - (first + last) / 2, last], axis=-1)
     return PaperTangent.build(sides, points, guides)
 
@@ -234,8 +276,11 @@ def polygon_normal(points: Floats) -> Floats:
     return unit_rows(unit_rows(cross(ahead, behind, axis=0)).sum(axis=2))
 
 
-def center_point(points: Floats, normals: Floats) -> Floats:
-    """Where the middle of each patch goes, ``(3,f)``: exact on spheres with regular polygons and on cylinders."""
+def center_point(points: Floats, normals: Floats, bulge: Floats) -> Floats:
+    """Where the middle of each patch goes, ``(3,f)``: exact on spheres with regular polygons and on cylinders.
+
+    ``bulge (f,)`` moves it outwards, in units of the mean distance from the corners to their mean.
+    """
     middle = points.mean(axis=2)
     offsets = middle[..., None] - points
     ahead = np.roll(offsets, -1, axis=2)
@@ -245,7 +290,10 @@ def center_point(points: Floats, normals: Floats) -> Floats:
     mean = np.where(weak, area, unit_rows(total))
     axis = unit_rows(mean + np.maximum(dot(mean, area), 0.0) ** 4 * area)
     along = -dot(offsets, normals + axis[..., None]) / np.maximum(1 + dot(normals, axis[..., None]), 0.5)
-    return middle + axis * along.mean(axis=1)
+    height = along.mean(axis=1)
+    if bulge.any():
+        height += bulge * np.sqrt(dot(offsets, offsets)).mean(axis=1)
+    return middle + axis * height
 
 
 @dataclass(eq=False)
