@@ -72,6 +72,13 @@ cross_tangent = option(
     "the paper.  [default: precise]",
 )
 alpha = option(SURFACE, "--alpha", type=float, metavar="A", help="Fullness of 'quadratic', above 0.  [default: 1]")
+bulge = option(
+    SURFACE,
+    "--bulge",
+    type=float,
+    metavar="B",
+    help="Swell faces by this part of their size, of 'precise' and 'smooth'; below 0, sink them.  [default: 0]",
+)
 normals = option(
     SURFACE,
     "--normals",
@@ -81,12 +88,27 @@ normals = option(
 
 # --- input ------------------------------------------------------------------------------------------------------
 
+marks = option(
+    SHARP,
+    "--marks",
+    metavar="FILE",
+    help="Creases, straight edges, flat faces and more from a JSON file, over what IN says itself; "
+    "'curvify marks' writes one to start from.",
+)
+sharp_angle = option(
+    SHARP,
+    "--sharp-angle",
+    type=float,
+    metavar="DEG",
+    help="Make edges sharp at which the faces turn by more than this angle.",
+)
 sharp_from = option(
     SHARP,
     "--sharp-from",
-    type=click.Choice(["auto", "normals", "none"]),
-    help="What makes an edge sharp: normals of the file that differ across it, unless they only repeat flat faces "
-    "(auto); the same in any case (normals); nothing (none).  [default: auto]",
+    type=click.Choice(["auto", "none", "angle", "normals", "groups", "tags"]),
+    help="What of IN makes edges sharp: its tags, else normals that differ (unless they only repeat flat faces), else "
+    "smoothing groups, else --sharp-angle (auto); one of these alone, normals in any case; or nothing (none).  "
+    "[default: auto]",
 )
 weld = option(
     MESH,

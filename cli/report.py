@@ -150,7 +150,7 @@ def refine_report(run: Run, layout: DenseLayout, recorder: Recorder) -> dict[str
         "vertex_deviation": _number(recorder.deviation),
         "vertex_rounding": _number(recorder.rounding),
         "volume_ratio": _number(recorder.volume_ratio),
-        "marks": {"file": run.mesh.marks.counts()},
+        "marks": patches.marks,
         "warnings": run.warnings,
     }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from curvify.cli.report import Recorder, refine_report, write_report
 from curvify.errors import FormatError, LimitError, MeshError, OptionError
 from curvify.formats.dense import dense_output
 from curvify.jobs import dense_layout
-from curvify.mesh import PolygonMesh
+from curvify.mesh import Marks, PolygonMesh
 from curvify.refinement import Surface, surface
 from curvify.schemes import load_scheme
 from curvify.sinks import DenseLayout
@@ -37,7 +37,10 @@ class Request:
     level: int
     cross_tangent: str | None
     alpha: float | None
+    bulge: float | None
     normals: str | None
+    marks: str | None
+    sharp_angle: float | None
     sharp_from: str | None
     weld: str | None
     split_rule: str | None
@@ -57,8 +60,8 @@ class Request:
 
     @property
     def scheme_options(self) -> dict[str, Any]:
-        """The scheme's options that were given."""
-        names = ("cross_tangent", "alpha", "normals", "sharp_from", "weld", "split_rule")
+        """The scheme's options that were given, but for the marks, which stand in a file."""
+        names = ("cross_tangent", "alpha", "bulge", "normals", "sharp_angle", "sharp_from", "weld", "split_rule")
         return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
 
     @property
@@ -106,7 +109,8 @@ class Run:
         """Every option in effect, the scheme's and the output's."""
         request = self.request
         return {
-            **asdict(self.options),
+            **plain_options(self.options),
+            "marks": request.marks,
             "precision": self.dtype.name,
             "triangulate": self.triangulate,
             "ascii": request.ascii,
@@ -122,8 +126,9 @@ def refine_file(request: Request) -> None:
     seconds: dict[str, float] = {}
     with timed(seconds, "read"):
         mesh = files.read_input(request.input, request.input_format)
+    marks = None if request.marks is None else read_marks(request.marks)
     with timed(seconds, "prepare"), files.naming(request.source, MeshError):
-        made = surface(mesh, request.scheme, **request.scheme_options)
+        made = surface(mesh, request.scheme, **request.scheme_options, marks=marks)
     warnings = [f"{request.source}: {text}" for text in made.warnings]
     for text in warnings:
         console.warn(text)
@@ -134,6 +139,18 @@ def refine_file(request: Request) -> None:
         _tell_prediction(run, console)
     else:
         _refine(run, console)
+
+
+def read_marks(path: str) -> Marks:
+    """The marks of a file. Raises FormatError."""
+    from curvify.formats.marks_json import read_marks
+
+    return read_marks(path)
+
+
+def plain_options(options: Any) -> dict[str, Any]:
+    """A scheme's options but for the marks, which are no plain value."""
+    return {field.name: getattr(options, field.name) for field in fields(options) if field.name != "marks"}
 
 
 def check(request: Request) -> tuple[Any, str]:
@@ -203,7 +220,7 @@ def _tell_prediction(run: Run, console: Console) -> None:
 
 def _refine(run: Run, console: Console) -> None:
     request = run.request
-    options = ", ".join(f"{name} {value}" for name, value in asdict(run.options).items())
+    options = ", ".join(f"{name} {value}" for name, value in plain_options(run.options).items())
     console.explain(f"{request.source}: {_sizes(run.surface.patches.counts)}")
     console.explain(f"scheme {request.scheme}, level {request.level}, {options}, {run.dtype.name}")
     console.explain(f"backend cpu, {count_of(run.threads, 'thread')}")

@@ -52,7 +52,7 @@ def describe(name: str) -> dict[str, Any]:
         "faces": module.faces,
         "continuity": module.continuity,
         "normals": list(module.normals),
-        "options": {field.name: field.default for field in fields(module.Options)},
+        "options": {field.name: field.default for field in fields(module.Options) if field.default is not None},
         "source": module.source,
     }
 

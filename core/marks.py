@@ -100,7 +100,7 @@ def gather_marks(
         return resolved, []
     decided = np.zeros(len(topology.edges), dtype=bool)
     lost: list[tuple[int, int]] = []
-    for name, marks in reversed(explicit.items()):
+    for marks in reversed(explicit.values()):
         _take_shapes(resolved, marks, topology, loops, stand_in, lost)
     for name, marks in explicit.items():
         resolved.counts[name] = marks.counts()
@@ -128,7 +128,9 @@ def gather_marks(
 
 
 def _decide(crease: Floats, decided: Bools, named: Bools, sharpness: Floats) -> int:
-    """Set the ``sharpness (E,2)`` of the edges ``named (E,)`` that no stronger source decided; the number of creases."""
+    """Set the ``sharpness (E,2)`` of the edges ``named (E,)`` that no stronger source decided; returns how many
+    creases that makes.
+    """
     new = named & ~decided
     crease[new] = np.broadcast_to(sharpness, crease.shape)[new]
     decided |= named

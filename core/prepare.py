@@ -200,10 +200,10 @@ def _given_normals(
     present = given.any(axis=1)
     if not present.any():
         return GivenNormals(None, [])
-    if sharp_from != "normals" and present.all():
-        if is_flat_shaded(given, loops.offsets, area, corner_links(topology)):
-            note = "the file's normals only repeat its flat faces and are ignored; keep them with --sharp-from normals"
-            return GivenNormals(None, [note] if _normals_differ(topology, given) else [])
+    asked = sharp_from == "normals"
+    if not asked and present.all() and is_flat_shaded(given, loops.offsets, area, corner_links(topology)):
+        note = "the file's normals only repeat its flat faces and are ignored; keep them with --sharp-from normals"
+        return GivenNormals(None, [note] if _normals_differ(topology, given) else [])
     missing = int((~present).sum())
     note = f"{count_of(missing, 'corner')} without a normal in the file, computed from the faces"
     return GivenNormals(given, [note] if missing else [])

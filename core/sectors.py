@@ -80,20 +80,11 @@ def resolve_features(
     normals, computed = _starting_normals(topology, positions, area, sectors, given, marks)
     sharp = _sharp_ends(topology, sectors)
     lines, turned = _line_tangents(topology, positions, sharp, marks.straight)
+    lined = np.linalg.norm(lines, axis=1) > 0
     tangled = _touched(topology, topology.nonmanifold)
-    lined = lines.any(axis=1)
-    corners = corners | (tangled & ~lined) | (marks.corner > 0)
-    own = np.ones(len(lined), dtype=bool)
-    own[topology.vertices[~computed]] = False
-    corners |= turned & own
-    # Where a crease runs into a rim, no plane holds both: the rim turns there.
-    crossed = ~topology.interior[topology.edge] & _touched(topology, sharp.any(axis=1))[topology.vertices]
-    lined[topology.vertices[crossed]] &= tangled[topology.vertices[crossed]]
-    straighten = (lined & ~corners)[topology.vertices] & (tangled[topology.vertices] | computed)
-    if straighten.any():
-        t = lines[topology.vertices[straighten]]
-        old = normals[straighten]
-        normals[straighten] = unit(old - dot(old, t) * t)
+    turned[topology.vertices[~computed]] = False
+    corners = corners | (tangled & ~lined) | (marks.corner > 0) | turned
+    _straighten_lines(topology, normals, lines, lined & ~corners, computed, sharp)
     straight = _straight_planes(topology, positions, sectors, marks.straight, np.where(corners[:, None], 0.0, lines))
     corners |= straight.torn
     straight.apply(normals)
@@ -103,6 +94,24 @@ def resolve_features(
     tangents, bending = _end_tangents(topology, positions, area, normals, lines, sharp, corners, marks)
     normals, adjusted = _fit_normals(topology, normals, tangents, corners)
     return Features(normals, tangents, bending, sharp, corners, adjusted)
+
+
+def _straighten_lines(
+    topology: Topology, normals: Floats, lines: Floats, lined: Bools, computed: Bools, sharp: Bools
+) -> None:
+    """Make the normals of vertices ``lined (V,)`` perpendicular to their lines, in place: computed ones, and all
+    where faces are no neighbors.
+
+    Not where a crease runs into a rim: no plane holds both, and the rim turns there.
+    """
+    rim = _touched(topology, ~topology.interior)
+    tangled = _touched(topology, topology.nonmanifold)
+    crossed = rim & ~tangled & _touched(topology, sharp[:, 0] | sharp[:, 1])
+    at = topology.vertices
+    chosen = (lined & ~crossed)[at] & (tangled[at] | computed)
+    if chosen.any():
+        t, old = lines[at[chosen]], normals[chosen]
+        normals[chosen] = unit(old - dot(old, t) * t)
 
 
 def _starting_normals(

@@ -90,7 +90,7 @@ class Patches:
     ``inner_faces (D,)``, ascending. ``curves (3,E,d+1)`` Bezier points of the edges; ``fields (3,N,q+1)`` Bezier
     points of edge normals, not of unit length, the first E those of the edges' first half-edges, and
     ``side_field (C,)`` the one on each half-edge; ``normals (C,3)`` unit normal of each patch corner.
-    ``warnings`` and ``counts`` for the report.
+    ``warnings``, ``counts`` and the number of ``marks`` by source and kind for the report.
     """
 
     positions: Floats
@@ -108,6 +108,7 @@ class Patches:
     mesh: PolygonMesh
     warnings: list[str] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
+    marks: dict[str, dict[str, int]] = field(default_factory=dict)
 
 
 class Scheme(Protocol):

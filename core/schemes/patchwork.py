@@ -114,6 +114,7 @@ class Patchwork:
             mesh=self.coarse.mesh,
             warnings=self.coarse.warnings + self.warnings,
             counts=self.coarse.counts | self.counts,
+            marks=self.coarse.marks.counts,
         )
 
 
@@ -296,6 +297,8 @@ def _note_splits(work: Patchwork, folded: Bools) -> None:
     work.warnings += split_notes(split, source_faces=loops.source_faces)
     work.counts["folded_patches"] = int(folded.sum())
     work.counts["adjusted_corners"] = work.features.adjusted
+    work.counts["crease_edges"] = int(work.features.sharp.any(axis=1).sum())
+    work.counts["corner_vertices"] = int(work.features.corners.sum())
     if folded.any():
         first = loops.source_faces[split.source_faces[np.flatnonzero(folded)[0]]]
         number = int(folded.sum())

@@ -54,7 +54,7 @@ def test_every_option_is_explained(name):
 
 def test_choices_of_options_are_those_of_the_library():
     from curvify.convex import RULES
-    from curvify.prepare import SHARP_SOURCES, WELD_MODES
+    from curvify.options import SHARP_SOURCES, WELD_MODES
     from curvify.refinement import MAX_FACES
     from curvify.schemes import NAMES
     from curvify.schemes.gregory import CROSS_TANGENTS, NORMALS

@@ -43,7 +43,7 @@ def test_the_report_of_a_closed_mesh(call, folder):
     assert report["vertex_deviation"] == 0
     assert 0 < report["vertex_rounding"] < 1e-6
     assert report["volume_ratio"] == pytest.approx(volume("dense.ply") / volume(TORUS), rel=1e-6)
-    assert report["marks"] == {"file": {}}
+    assert report["marks"] == {}
     assert report["warnings"] == []
 
 
@@ -127,7 +127,7 @@ def test_marks_are_counted(call, folder):
     with Path("cube.obj").open("a") as file:
         file.write("t crease 2/1/0 0 1 10.0\nt corner 1/1/0 2 10.0\n")
     report = json.loads(call("refine", "cube.obj", "dense.ply", "--report", "-").out)
-    assert report["marks"]["file"] == {"crease": 1, "corner": 1}
+    assert report["marks"]["tags"] == {"crease": 1, "corner": 1}
 
 
 def test_no_report_of_a_failure(call, folder):

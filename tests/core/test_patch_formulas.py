@@ -87,7 +87,7 @@ def test_center_points_follow_the_equations_for_wild_normals_too(sides: int) -> 
     generator = np.random.default_rng(sides)
     for _ in range(20):
         normals = unit(generator.standard_normal((sides, 3)))
-        found = center_point(points.T[:, None], normals.T[:, None])[:, 0]
+        found = center_point(points.T[:, None], normals.T[:, None], np.zeros(1))[:, 0]
         assert np.abs(found - Patch(points, normals, "precise").center()).max() < 1e-13
 
 
