@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Write the sample meshes: small coarse shapes to refine, each built from a few lines of geometry.
+"""Write the sample meshes: small coarse shapes to refine, each built from a few lines of geometry, and marks for them.
 
 Run ``python make_samples.py [DIRECTORY]``; without a directory the files are written beside this script.
 The output is the same on every run.
@@ -17,6 +17,8 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+
+import make_marks
 
 Array = npt.NDArray[np.float64]
 Face = tuple[int, ...]
@@ -143,6 +145,31 @@ def torus() -> Sample:
     for level in range(tube):
         faces += band(level * around, (level + 1) % tube * around, around)
     return Sample("torus", "torus: 36 quads, 9 around and 4 round the tube", vertices, faces)
+
+
+def ring() -> Sample:
+    """Return a ring of eight segments with a tube of six sides, level above and below."""
+    around, tube = 8, 6
+    angles = 2.0 * np.pi * np.arange(tube) / tube
+    vertices = np.concatenate([circle(1.0 + 0.4 * np.cos(a), 0.4 * np.sin(a), around) for a in angles])
+    faces: list[Face] = []
+    for level in range(tube):
+        faces += band(level * around, (level + 1) % tube * around, around)
+    return Sample("ring", "ring: 48 quads, 8 around and 6 round the tube", vertices, faces)
+
+
+def ball() -> Sample:
+    """Return a ball of twelve sides with a polygon of twelve sides at either end."""
+    polar = np.radians(np.linspace(160.0, 20.0, 6))
+    vertices, faces = revolve([(float(np.sin(a)), float(-np.cos(a))) for a in polar[::-1]], 12)
+    return Sample("ball", "ball: 60 quads and two polygons of 12 sides on the unit sphere", vertices, faces)
+
+
+def knob() -> Sample:
+    """Return a knob of eight sides as it comes from a lathe: five bands between two octagons."""
+    profile = [(0.5, 0.0), (0.5, 0.15), (0.22, 0.3), (0.22, 0.6), (0.4, 0.75), (0.3, 1.0)]
+    vertices, faces = revolve(profile, 8)
+    return Sample("knob", "knob: a turned part, 40 quads and 2 octagons", vertices, faces)
 
 
 def mushroom() -> Sample:
@@ -272,13 +299,16 @@ BUILDERS: tuple[Callable[[], Sample], ...] = (
     mixed,
     l_part,
     cylinder,
+    ring,
+    ball,
+    knob,
 )
-"""One function for each file, in the order in which they are written."""
+"""One function for each mesh, in the order in which they are written."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Write every sample into the directory named on the command line."""
-    parser = argparse.ArgumentParser(description="Write the sample meshes as OBJ files.")
+    parser = argparse.ArgumentParser(description="Write the sample meshes as OBJ files and their marks as JSON.")
     parser.add_argument(
         "directory",
         nargs="?",
@@ -294,6 +324,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         path.write_text(obj_text(sample), encoding="utf-8", newline="\n")
         corners = sum(len(face) for face in sample.faces)
         print(f"{path.name}: {len(sample.vertices)} vertices, {len(sample.faces)} faces, {corners} corners")
+    for make in make_marks.BUILDERS:
+        marked = make()
+        path = directory / f"{marked.name}.json"
+        path.write_text(make_marks.json_text(marked), encoding="utf-8", newline="\n")
+        print(f"{path.name}: for {marked.mesh}.obj, {marked.comment}")
 
 
 if __name__ == "__main__":
