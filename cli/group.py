@@ -14,6 +14,7 @@ from curvify import __version__
 COMMANDS = {
     "refine": "Turn a coarse polygon mesh into a dense mesh of a smooth surface.",
     "split": "Cut concave and many-sided faces into convex ones.",
+    "marks": "Write the sharp features of a mesh as a marks file.",
     "schemes": "List the surface schemes and their options.",
 }
 

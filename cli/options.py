@@ -142,6 +142,9 @@ output_format = option(
     OUTPUT, "--output-format", metavar="NAME", help="Format of OUT where its suffix does not tell, as for '-'."
 )
 triangulate = option(OUTPUT, "--triangulate", is_flag=True, help="Write triangles instead of quads.")
+weld_normals = option(
+    OUTPUT, "--weld-normals", is_flag=True, help="Give every vertex one normal, the mean of its sides, also on creases."
+)
 precision = option(
     OUTPUT,
     "--precision",

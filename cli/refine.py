@@ -12,6 +12,7 @@ from curvify.cli.group import COMMANDS, Command
 EXAMPLES = (
     ("A smooth surface through the vertices of coarse.obj", "curvify refine coarse.obj dense.ply"),
     ("Finer, as triangles, with measurements", "curvify refine coarse.obj dense.stl -k 8 --report dense.json"),
+    ("Sharp edges where faces turn by more than 40 degrees", "curvify refine coarse.obj dense.ply --sharp-angle 40"),
     ("How large would that be?", "curvify refine coarse.obj dense.ply -k 100 --dry-run"),
     (
         "In a pipeline",
@@ -37,6 +38,7 @@ EXAMPLES = (
     options.input_format,
     options.output_format,
     options.triangulate,
+    options.weld_normals,
     options.precision,
     options.as_text,
     options.no_clobber,

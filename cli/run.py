@@ -47,6 +47,7 @@ class Request:
     input_format: str | None
     output_format: str | None
     triangulate: bool
+    weld_normals: bool
     precision: str
     ascii: bool
     no_clobber: bool
@@ -100,6 +101,11 @@ class Run:
         return self.request.triangulate or self.format not in files.POLYGON_FORMATS
 
     @property
+    def written(self) -> Surface:
+        """The surface as it is written."""
+        return self.surface.weld_normals() if self.request.weld_normals else self.surface
+
+    @property
     def faces(self) -> int:
         """Faces that will be written."""
         return predicted_faces(self.surface, self.request.level, self.triangulate)
@@ -113,6 +119,7 @@ class Run:
             "marks": request.marks,
             "precision": self.dtype.name,
             "triangulate": self.triangulate,
+            "weld_normals": request.weld_normals,
             "ascii": request.ascii,
             "max_faces": request.max_faces,
         }
@@ -211,7 +218,7 @@ def _check_limit(run: Run) -> None:
 
 
 def _tell_prediction(run: Run, console: Console) -> None:
-    request, patches = run.request, run.surface.patches
+    request, patches = run.request, run.written.patches
     layout = dense_layout(patches, number_dense_mesh(patches, request.level), run.dtype)
     bytes_ = predicted_bytes(layout, run.format, request.ascii, run.triangulate)
     console.tell(f"{request.source}: {_sizes(patches.counts)}")
@@ -250,7 +257,7 @@ def _write(run: Run, recorder: Recorder | None, console: Console) -> DenseLayout
     ):
         if recorder is not None:
             sink = recorder.into(sink)
-        layout = run.surface.stream(
+        layout = run.written.stream(
             sink, request.level, run.dtype, threads=run.threads, max_faces=request.max_faces, progress=progress
         )
     if request.output == files.STREAM:

@@ -28,13 +28,16 @@ OWN_SOURCES = ("tags", "normals", "groups", "angle")
 class ResolvedMarks:
     """What all sources together say about a mesh of E edges, V vertices and F faces.
 
-    ``crease (E,2)`` sharpness in 0..1 at the ends in canonical direction, 0 where smooth; ``straight (E,)``;
+    ``crease (E,2)`` sharpness in 0..1 at the ends in canonical direction, 0 where smooth; ``named (E,)``, where a mark
+    or tag decided that, and ``rims (E,)``, where a flat face did; ``straight (E,)``;
     ``edge_normals (E,3)`` as given, zero where none; ``kappa (E,)``, NaN where none; ``corner (V,)`` sharpness in
     0..1; ``flat (F,)``; ``bulge (F,)``, ``alpha (F,)``, NaN where the scheme's own holds. ``counts`` has the number
     of marks of each kind by source; those of ``normals``, ``groups`` and ``angle`` are creases that they decided.
     """
 
     crease: Floats
+    named: Bools
+    rims: Bools
     straight: Bools
     edge_normals: Floats
     kappa: Floats
@@ -49,6 +52,8 @@ class ResolvedMarks:
         """A mesh without marks."""
         return cls(
             np.zeros((edges, 2)),
+            np.zeros(edges, dtype=bool),
+            np.zeros(edges, dtype=bool),
             np.zeros(edges, dtype=bool),
             np.zeros((edges, 3)),
             np.full(edges, np.nan),
@@ -105,8 +110,10 @@ def gather_marks(
     for name, marks in explicit.items():
         resolved.counts[name] = marks.counts()
         _take_creases(resolved.crease, decided, marks, topology, stand_in, lost)
-        flat = np.isin(loops.source_faces, marks.flat_faces)
-        _decide(resolved.crease, decided, _flat_rims(topology, area, flat), np.ones(2))
+        resolved.named |= decided & ~resolved.rims
+        rims = _flat_rims(topology, area, np.isin(loops.source_faces, marks.flat_faces)) & ~decided
+        _decide(resolved.crease, decided, rims, np.ones(2))
+        resolved.rims |= rims
     notes = _note_lost(lost)
     sources = own_sources(options.sharp_from)
     if given is not None and "normals" in sources:
@@ -225,6 +232,36 @@ def _flat_rims(topology: Topology, area: Floats, flat: Bools) -> Bools:
         plane = degrees_between(area[faces[one]], area[faces[other]]) < COPLANAR
         rims[topology.edge[one[plane]]] = False
     return rims & topology.interior
+
+
+def found_marks(resolved: ResolvedMarks, topology: Topology, loops: Loops, holes: Bools) -> Marks:
+    """What was found, by vertices and faces of the mesh: alone, it makes the same features.
+
+    Not listed are the creases round flat faces, which these bring along. ``holes (F,)`` are faces of the mesh.
+    """
+    sharp = topology.interior & resolved.crease.any(axis=1)
+    creases = np.flatnonzero((sharp | resolved.named) & ~resolved.rims)
+    bent = np.flatnonzero(resolved.edge_normals.any(axis=1))
+    curled = np.flatnonzero(~np.isnan(resolved.kappa))
+    corners = np.flatnonzero(resolved.corner > 0)
+    bulged, full = (np.flatnonzero(~np.isnan(values)) for values in (resolved.bulge, resolved.alpha))
+    return Marks(
+        crease_edges=topology.edges[creases],
+        crease_sharpness=resolved.crease[creases],
+        straight_edges=topology.edges[resolved.straight],
+        corner_vertices=corners,
+        corner_sharpness=resolved.corner[corners],
+        flat_faces=loops.source_faces[resolved.flat],
+        hole_faces=np.flatnonzero(holes),
+        bent_edges=topology.edges[bent],
+        edge_normals=resolved.edge_normals[bent],
+        curled_edges=topology.edges[curled],
+        kappas=resolved.kappa[curled],
+        bulged_faces=loops.source_faces[bulged],
+        bulges=resolved.bulge[bulged],
+        full_faces=loops.source_faces[full],
+        alphas=resolved.alpha[full],
+    )
 
 
 # --- what the mesh says without words -------------------------------------------------------------------------

@@ -13,12 +13,12 @@ import numpy as np
 
 from curvify.edges import edge_curves
 from curvify.errors import MeshError
-from curvify.marks import ResolvedMarks, gather_marks, hole_faces
-from curvify.mesh import Bools, Floats, Ints, PolygonMesh
+from curvify.marks import ResolvedMarks, found_marks, gather_marks, hole_faces
+from curvify.mesh import Bools, Floats, Ints, Marks, PolygonMesh
 from curvify.normals import SAME_NORMAL, degrees_between, is_flat_shaded, unit
 from curvify.options import MeshOptions
 from curvify.polygons import newell_normals
-from curvify.sectors import Features, label_sectors, resolve_features
+from curvify.sectors import Features, end_normals, label_sectors, resolve_features, sides_of_edges
 from curvify.topology import (
     Loops,
     Topology,
@@ -42,7 +42,8 @@ class Coarse:
 
     ``positions (V,3)`` as read, ``stand_in (V,)`` the vertex that each is welded to; welded ``loops``, their
     ``topology``, area vectors ``area (F,3)``, ``fans (C,)`` and ``sectors (C,)``; ``given (C,3)`` unit normals of the
-    corners, zero where the file has none, or None where all are to be computed; ``marks`` resolved for these loops.
+    corners, zero where the file has none, or None where all are to be computed; ``marks`` resolved for these loops;
+    ``holes`` are faces of the mesh that were left out.
     """
 
     mesh: PolygonMesh
@@ -55,6 +56,7 @@ class Coarse:
     sectors: Ints
     given: Floats | None
     marks: ResolvedMarks
+    holes: Bools
     warnings: list[str] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
 
@@ -65,6 +67,38 @@ class Coarse:
         return resolve_features(
             self.topology, self.positions, self.area, self.fans, self.sectors, self.given, self.marks, corners
         )
+
+    def note_features(self, features: Features) -> tuple[dict[str, int], list[str]]:
+        """Counts of sharp features for the report, and what there is to warn of."""
+        topology = self.topology
+        sides = [end_normals(topology, features.normals, half_edges) for half_edges in sides_of_edges(topology)]
+        apart = topology.interior & (sides[0] != sides[1]).any(axis=(1, 2))
+        unmarked = np.flatnonzero(apart & ~self.marks.crease.any(axis=1))
+        asked = self.marks.corner[topology.edges[unmarked]].any(axis=1)
+        unmarked = unmarked[~asked]
+        counts = {
+            "crease_edges": int(features.sharp.any(axis=1).sum()),
+            "corner_vertices": int(features.corners.sum()),
+            "broken_edges": len(unmarked),
+            "adjusted_corners": features.adjusted,
+        }
+        notes = []
+        if len(unmarked):
+            a, b = topology.edges[unmarked[0]]
+            notes.append(
+                f"{count_of(len(unmarked), 'edge')} without a mark not smooth at an end, first: {a}-{b}; "
+                "creases or rims turn there too sharply for one tangent plane"
+            )
+        if features.adjusted:
+            notes.append(
+                f"{count_of(features.adjusted, 'corner')} could not keep the normal of the vertex: "
+                "no curve along an edge fits all its faces"
+            )
+        return counts, notes
+
+    def found_marks(self) -> Marks:
+        """The marks that all sources together make, by vertices and faces of the mesh."""
+        return found_marks(self.marks, self.topology, self.loops, self.holes)
 
     def edge_curves(self, features: Features, lengths: str = "circle") -> Floats:
         """Bezier points ``(E,4,3)`` of the mesh's edges in canonical direction; ``lengths`` as in ``edges``."""
@@ -101,7 +135,7 @@ def prepare_mesh(mesh: PolygonMesh, options: MeshOptions | None = None) -> Coars
     marks, notes = gather_marks(mesh, options, topology, loops, stand_in, area, given.normals)
     around = fans(topology)
     sectors = label_sectors(topology, around, marks.crease)
-    coarse = Coarse(mesh, positions, stand_in, loops, topology, area, around, sectors, given.normals, marks)
+    coarse = Coarse(mesh, positions, stand_in, loops, topology, area, around, sectors, given.normals, marks, holes)
     coarse.counts["hole_faces"] = int(holes.sum())
     coarse.warnings += mesh.warnings
     _note_topology(coarse, int((stand_in != np.arange(len(stand_in))).sum()), dropped)

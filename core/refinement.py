@@ -7,7 +7,7 @@ take jobs in order; a sink that can write anywhere takes blocks as they come, th
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -69,6 +69,12 @@ class Surface:
         normal /= np.sqrt(np.where(parallel, 1.0, square))[:, None]
         normal[parallel] = evaluate.blended_normals(self.patches, ids[parallel], places[parallel])
         return position, normal
+
+    def weld_normals(self) -> Surface:
+        """The same surface with one normal for every vertex of its dense mesh, also on creases."""
+        from curvify.shading import weld_normals
+
+        return replace(self, patches=weld_normals(self.patches))
 
     def face_count(self, level: int) -> int:
         """Faces of the dense mesh at a level."""
@@ -153,14 +159,19 @@ def refine(
     dtype: object = np.float64,
     threads: int | None = None,
     max_faces: int = MAX_FACES,
+    weld_normals: bool = False,
     **options: Any,
 ) -> DenseMesh:
     """Refine a polygon mesh: every edge becomes 2 ``level`` segments.
 
-    ``options`` are the scheme's (see ``curvify.schemes``); the others as in ``Surface.stream``.
-    Raises CurvifyError where the mesh or an option cannot be used.
+    ``weld_normals`` gives every vertex one normal, also on creases; ``options`` are the scheme's (see
+    ``curvify.schemes``); the others as in ``Surface.stream``. Raises CurvifyError where the mesh or an option cannot
+    be used.
     """
-    return surface(mesh, scheme, **options).refine(level, dtype, threads=threads, max_faces=max_faces)
+    made = surface(mesh, scheme, **options)
+    if weld_normals:
+        made = made.weld_normals()
+    return made.refine(level, dtype, threads=threads, max_faces=max_faces)
 
 
 def _check_inside(sides: Ints, points: Floats) -> None:

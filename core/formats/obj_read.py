@@ -235,9 +235,8 @@ def _assemble(
         )
         warnings.append(f"{faces} skipped, the first at line {first}")
     if context.tags.unknown:
-        warnings.append(
-            f"tags other than crease, corner, hole, flat, straight were ignored: {context.tags.unknown}"
-        )
+        listed = ", ".join(list(context.tags.unknown)[:5])
+        warnings.append(f"unknown tags were ignored: {sum(context.tags.unknown.values())} ({listed})")
     if context.unknown:
         listed = ", ".join(list(context.unknown)[:5]) + (", ..." if len(context.unknown) > 5 else "")
         warnings.append(

@@ -8,6 +8,7 @@ Indices count from 0, sharpness runs from 0 to 10 (and becomes 0..1 by value/10,
     t hole 1/0/0 FACE
     t flat 1/0/0 FACE                 curvify's own
     t straight 2/0/0 A B              curvify's own; more vertices make a chain
+    t interpolateboundary 1/0/0 N     holds in any case
 """
 
 from __future__ import annotations
@@ -37,15 +38,17 @@ class Tags:
     corner: list[tuple[int, float, int]] = field(default_factory=list)
     flat: list[tuple[int, int]] = field(default_factory=list)
     hole: list[tuple[int, int]] = field(default_factory=list)
-    unknown: int = 0
+    unknown: dict[str, int] = field(default_factory=dict)
 
     def add(self, fields: list[bytes], line: int) -> None:
         """Take in the words of one ``t`` line. Raises TagError."""
         name = fields[0] if fields else b""
-        if name not in (b"crease", b"straight", b"corner", b"flat", b"hole"):
-            self.unknown += 1
+        if name not in (b"crease", b"straight", b"corner", b"flat", b"hole", b"interpolateboundary"):
+            self.unknown[quote(name)] = self.unknown.get(quote(name), 0) + 1
             return
         ints, floats = _arguments(fields)
+        if name == b"interpolateboundary":  # a surface through its vertices does so anyway
+            return
         if name == b"crease":
             self._add_crease(ints, floats, line)
         elif name == b"straight":

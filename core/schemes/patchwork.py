@@ -296,9 +296,8 @@ def _note_splits(work: Patchwork, folded: Bools) -> None:
     work.counts.update({f"{reason}_faces": number for reason, number in split.counts.items()})
     work.warnings += split_notes(split, source_faces=loops.source_faces)
     work.counts["folded_patches"] = int(folded.sum())
-    work.counts["adjusted_corners"] = work.features.adjusted
-    work.counts["crease_edges"] = int(work.features.sharp.any(axis=1).sum())
-    work.counts["corner_vertices"] = int(work.features.corners.sum())
+    counts, notes = work.coarse.note_features(work.features)
+    work.counts |= counts
     if folded.any():
         first = loops.source_faces[split.source_faces[np.flatnonzero(folded)[0]]]
         number = int(folded.sum())
@@ -306,8 +305,4 @@ def _note_splits(work: Patchwork, folded: Bools) -> None:
             f"{count_of(number, 'patch folds', 'patches fold')}, first in face {first}: "
             "the normals there turn too far for the polygon"
         )
-    if work.features.adjusted:
-        work.warnings.append(
-            f"{count_of(work.features.adjusted, 'corner')} could not keep the normal of the vertex: "
-            "no curve along an edge fits all its faces"
-        )
+    work.warnings += notes

@@ -132,7 +132,8 @@ def test_tags() -> None:
 def test_warnings_count_what_was_ignored() -> None:
     mesh = read(
         TRIANGLE
-        + b"f 1 2\nf 1\nf\nf 1 2 3\nt creasemethod 0/0/1 chaikin\nfoo 1\nbar\nfoo\nl 1 2\np 1\ns what\n"
+        + b"f 1 2\nf 1\nf\nf 1 2 3\nt creasemethod 0/0/1 chaikin\nt interpolateboundary 1/0/0 2\n"
+        b"foo 1\nbar\nfoo\nl 1 2\np 1\ns what\n"
         b"vn nan 0 0\nvn 0 0 0\nf 1//1 2//2 3//2\n"
     )
     assert mesh.face_count == 2
@@ -140,7 +141,7 @@ def test_warnings_count_what_was_ignored() -> None:
     assert mesh.warnings == (
         "1 normals are not finite numbers and were ignored",
         "3 faces with fewer than 3 corners were skipped, the first at line 4",
-        "tags other than crease, corner, hole, flat, straight were ignored: 1",
+        "unknown tags were ignored: 1 ('creasemethod')",
         "lines with unknown keywords were ignored: 4 ('foo', 'bar', 's')",
     )
 
