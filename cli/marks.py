@@ -33,9 +33,10 @@ EXAMPLES = (
 def command(**given: Any) -> None:
     """Write the sharp features of a mesh as a marks file.
 
-    Shape controls go with them. Creases come from the tags of IN, from normals that differ across an edge, from smoothing groups and from
-    --sharp-angle; the strongest source that names an edge decides. OUT is JSON; '-' is standard output. Edit it and
-    give it to 'curvify refine --marks': what it says holds over IN, and alone with --sharp-from none.
+    Shape controls go with them. Creases come from the tags of IN, from normals that differ across an edge, from
+    smoothing groups and from --sharp-angle; the strongest source that names an edge decides. OUT is JSON; '-' is
+    standard output. Edit it and give it to 'curvify refine --marks': what it says holds over IN, and alone with
+    --sharp-from none.
     """
     marks_file(**given)
 

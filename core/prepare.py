@@ -96,6 +96,16 @@ class Coarse:
             )
         return counts, notes
 
+    def unused_marks(self, used: tuple[str, ...], scheme: str) -> list[str]:
+        """Warnings of marks ``bulge``, ``alpha`` and ``kappa`` that are not among those that a scheme has a use for."""
+        known = {"bulge": self.marks.bulge, "alpha": self.marks.alpha, "kappa": self.marks.kappa}
+        counts = {name: int((~np.isnan(values)).sum()) for name, values in known.items() if name not in used}
+        return [
+            f"{count_of(number, f'{name} mark')} ignored: {scheme} has no use for {name}"
+            for name, number in counts.items()
+            if number
+        ]
+
     def found_marks(self) -> Marks:
         """The marks that all sources together make, by vertices and faces of the mesh."""
         return found_marks(self.marks, self.topology, self.loops, self.holes)

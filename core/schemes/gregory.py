@@ -85,6 +85,8 @@ def prepare(mesh: PolygonMesh, options: Options | None = None) -> Patches:
 
     work = build_patchwork(coarse, options.tangent_lengths, options.split_rule, inward)
     shape = face_shapes(work, options)
+    used = {"precise": ("bulge",), "smooth": ("bulge",), "quadratic": ("alpha",)}.get(options.cross_tangent, ())
+    work.warnings += coarse.unused_marks(used, f"gregory with {options.cross_tangent} cross tangents")
     classes = []
     for sides, patches in work.size_classes():
         corners = work.topology.offsets[patches][:, None] + np.arange(sides)
