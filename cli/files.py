@@ -35,19 +35,23 @@ def check_input(path: str, format: str | None) -> None:
 
 def check_output(path: str, format: str | None, no_clobber: bool = False) -> str:
     """The format of OUT. Raises CurvifyError where it cannot be written, so far as that is known before the work."""
-    if path == STREAM:
-        if format is None:
-            raise OptionError("standard output needs --output-format, for example --output-format ply")
-        if sys.stdout is None:
-            raise FormatError("standard output is closed")
+    if path == STREAM and format is None:
+        raise OptionError("standard output needs --output-format, for example --output-format ply")
     with hint("--output-format", format):
         chosen = find_format(path, format, WRITE_FORMATS)
+    check_target(path, no_clobber)
+    return chosen
+
+
+def check_target(path: str, no_clobber: bool = False) -> None:
+    """Raise FormatError where OUT cannot be written, so far as that is known before the work."""
     if path == STREAM:
-        return chosen
+        if sys.stdout is None:
+            raise FormatError("standard output is closed")
+        return
     check_folder(path)
     if no_clobber and os.path.lexists(path):
         raise FormatError(f"{path}: it exists already; leave out --no-clobber to replace it")
-    return chosen
 
 
 def check_folder(path: str) -> None:

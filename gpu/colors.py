@@ -9,6 +9,7 @@ from curvify.errors import OptionError
 from curvify.mesh import Floats
 
 Color = tuple[float, float, float]
+Image = NDArray[np.uint8]
 
 #: Colors of values from low to high, evenly apart: dark to light all along, so that they work in gray too.
 VALUE_COLORS = ("#20124d", "#2b2a80", "#1f4f9a", "#15759a", "#1f9a8a", "#4fb96c", "#95d04f", "#d8de55", "#fdf3a8")
@@ -42,7 +43,7 @@ def to_shown(light: Floats) -> Floats:
     return np.where(values > 0.0031308, 1.055 * values ** (1 / 2.4) - 0.055, 12.92 * values).astype(np.float32)
 
 
-def to_bytes(image: Floats, background: Color | None) -> NDArray[np.uint8]:
+def to_bytes(image: Floats, background: Color | None) -> Image:
     """A picture ``(h,w,3)`` from premultiplied linear light ``(h,w,4)``; ``(h,w,4)`` where the background is None."""
     alpha = np.clip(image[..., 3:], 0.0, 1.0)
     if background is not None:

@@ -7,18 +7,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from curvify.gpu.colors import Color, to_bytes, to_linear
+from curvify.gpu.colors import Color, Image, to_bytes, to_linear
 from curvify.gpu.device import Device, open_device
 from curvify.gpu.render import draw_panels
 from curvify.gpu.scene import Panel, Settings
-from curvify.mesh import Floats
 
 if TYPE_CHECKING:
     from PIL import ImageFont
-
-Image = NDArray[np.uint8]
 
 #: Height of the letters of a caption as a part of a panel's shorter side, and the least in pixels.
 LETTERS, LEAST_LETTERS = 1 / 22, 10
@@ -47,21 +43,23 @@ def picture(panels: Sequence[Panel], settings: Settings | None = None, device: D
     captions = [panel.caption for panel in panels]
     if any(captions):
         parts = [_with_caption(part, text, settings) for part, text in zip(parts, captions, strict=True)]
-    return to_bytes(_grid(parts, settings.columns or len(parts)), settings.background)
+    return _grid(parts, settings)
 
 
-def _grid(parts: Sequence[Floats], columns: int) -> Floats:
-    """Pictures of one size in rows, with nothing where the last row is not full."""
+def _grid(parts: Sequence[Image], settings: Settings) -> Image:
+    """Pictures of one size in rows, with background where the last row is not full."""
+    columns = min(settings.columns or len(parts), len(parts))
     height, width, channels = parts[0].shape
     rows = -(-len(parts) // columns)
-    image = np.zeros((rows * height, min(columns, len(parts)) * width, channels), dtype=np.float32)
+    image = np.empty((rows * height, columns * width, channels), dtype=np.uint8)
+    image[:] = to_bytes(np.zeros((1, 1, 4), dtype=np.float32), settings.background)
     for k, part in enumerate(parts):
         row, column = divmod(k, columns)
         image[row * height : (row + 1) * height, column * width : (column + 1) * width] = part
     return image
 
 
-def _with_caption(image: Floats, text: str, settings: Settings) -> Floats:
+def _with_caption(image: Image, text: str, settings: Settings) -> Image:
     """A picture with a strip under it that holds a line of text."""
     from PIL import Image as Pillow
     from PIL import ImageDraw
@@ -74,7 +72,7 @@ def _with_caption(image: Floats, text: str, settings: Settings) -> Floats:
     ImageDraw.Draw(mask).text((width / 2, strip / 2 - letters * 0.1), text, fill=255, font=font, anchor="mm")
     share = np.asarray(mask, dtype=np.float32)[..., None] / 255
     ink = np.append(to_linear(_ink(settings.background)), np.float32(1.0))
-    return np.concatenate([image, share * ink])
+    return np.concatenate([image, to_bytes(share * ink, settings.background)])
 
 
 def _fitting(text: str, letters: int, width: int) -> tuple[ImageFont.FreeTypeFont | ImageFont.ImageFont, str]:

@@ -1,8 +1,8 @@
 """Drawing panels on an OpenGL 3.3 device into arrays of linear light.
 
 Surfaces are triangles, lines are quads that know how much of a pixel they cover. Everything is drawn at four times the
-size in each direction and averaged, in linear light: on software OpenGL that takes a third of the time of multisampling,
-and it smooths whatever shaders do as well. Large panels are drawn in tiles.
+size in each direction and averaged in linear light, which on software OpenGL takes a third of the time of multisampling
+and smooths what shaders do as well. Large panels are drawn in tiles.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from curvify.gpu.camera import Camera
-from curvify.gpu.colors import NO_VALUE_COLOR, VALUE_COLORS, parse_color, to_linear
+from curvify.gpu.colors import NO_VALUE_COLOR, VALUE_COLORS, Image, parse_color, to_bytes, to_linear
 from curvify.gpu.device import Device
 from curvify.gpu.scene import Layer, Panel, Place, Settings, Stroke, place_panels
 from curvify.gpu.shading import shading_normals
@@ -37,8 +37,8 @@ WIDEST_WIRE = 0.12
 _STYLES = {"shaded": 0, "zebra": 1, "normals": 2, "values": 3}
 
 
-def draw_panels(panels: Sequence[Panel], settings: Settings, device: Device) -> list[Floats]:
-    """Pictures ``(height,width,4)`` of the panels, float32: premultiplied linear light, transparent where nothing is.
+def draw_panels(panels: Sequence[Panel], settings: Settings, device: Device) -> list[Image]:
+    """Pictures of the panels ``(height,width,3)`` or, without a background, ``(height,width,4)``, uint8.
 
     Raises OptionError and MeshError for what cannot be drawn, DeviceError where the device fails.
     """
@@ -105,10 +105,10 @@ class Painter:
             no_value_color=to_linear(parse_color(NO_VALUE_COLOR)),
         )
 
-    def draw(self, layers: Sequence[Layer], meshes: Sequence[PolygonMesh], place: Place, camera: Camera) -> Floats:
-        """A panel of layers, whose polygons are ``meshes``, as ``(height,width,4)``."""
+    def draw(self, layers: Sequence[Layer], meshes: Sequence[PolygonMesh], place: Place, camera: Camera) -> Image:
+        """A panel of layers, whose polygons are ``meshes``, as ``(height,width,3|4)``."""
         width, height = self.settings.size
-        image = np.empty((height, width, 4), dtype=np.float32)
+        image = np.empty((height, width, 4 if self.settings.background is None else 3), dtype=np.uint8)
         with ExitStack() as held:
             drawings = [
                 _Drawing(self, layer, mesh, place, camera, held) for layer, mesh in zip(layers, meshes, strict=True)
@@ -117,7 +117,7 @@ class Painter:
                 self._begin(x, y, wide, high, camera)
                 for drawing in drawings:
                     drawing.draw()
-                part = self._read(wide, high)
+                part = to_bytes(self._read(wide, high), self.settings.background)
                 top = height - (y + high) // FINER
                 image[top : top + high // FINER, x // FINER : (x + wide) // FINER] = part
         self.device.check()
@@ -139,7 +139,7 @@ class Painter:
         _set(self.line, pixels=extent)
 
     def _read(self, wide: int, high: int) -> Floats:
-        """The tile that was drawn ``(high/FINER,wide/FINER,4)``, top row first."""
+        """Premultiplied linear light of the tile that was drawn ``(high/FINER,wide/FINER,4)``, top row first."""
         import moderngl
 
         wide, high = wide // FINER, high // FINER

@@ -18,7 +18,7 @@ from curvify.mesh import DenseMesh, Floats, PolygonMesh
 STYLES = ("shaded", "zebra", "normals", "values", "hidden")
 FITS = ("auto", "same", "each")
 #: Pixels of a panel in each direction, and of the whole picture.
-LARGEST_SIDE, MOST_PIXELS = 16_384, 1 << 28
+LARGEST_SIDE, MOST_PIXELS = 16_384, 1 << 27
 #: Boxes at most this part of their size apart, and this much smaller than one another, are versions of one mesh.
 NEARLY_SAME = 0.2, 0.6
 
@@ -88,8 +88,8 @@ class Settings:
 
     ``size``: width and height of a panel in pixels. ``background`` None is transparent. ``field_of_view`` in degrees, 0
     for a parallel projection. ``fit``: the ``same`` camera for all panels, one for ``each``, or ``auto``: the same
-    where all show about the same box. ``columns`` panels stand in a row, all by default. ``stripes``: dark bands of the room
-    that a zebra mirrors, from floor to ceiling. ``color`` and ``back``: the two sides of a shaded surface.
+    where all show about the same box. ``columns`` panels stand in a row, all by default. ``stripes``: dark bands of
+    the room that a zebra mirrors, from floor to ceiling. ``color`` and ``back``: the two sides of a shaded surface.
     """
 
     size: tuple[int, int] = (800, 600)
@@ -100,7 +100,7 @@ class Settings:
     fit: str = "auto"
     columns: int | None = None
     stripes: int = 10
-    color: Color = (0.60, 0.70, 0.82)
+    color: Color = (153 / 255, 179 / 255, 209 / 255)
     back: Color = (0.84, 0.62, 0.48)
 
     def check(self, panels: int) -> None:
