@@ -42,11 +42,11 @@ float lamp(vec3 n, vec3 direction, float softness) {
 
 // Key light from the upper left, fill light from the right, and a bright room around.
 vec3 lit(vec3 base, vec3 n, vec3 towards_eye) {
-    const vec3 key = vec3(-0.45, 0.70, 0.55), fill = vec3(0.85, 0.05, 0.55);
-    vec3 room = mix(vec3(0.20, 0.19, 0.185), vec3(0.36, 0.37, 0.39), 0.5 + 0.5 * n.y);
-    vec3 light = room + 0.72 * lamp(n, key, 0.20) + vec3(0.13, 0.14, 0.16) * lamp(n, fill, 0.40);
+    const vec3 key = vec3(-0.50, 0.68, 0.60), fill = vec3(0.85, 0.05, 0.55);
+    vec3 room = mix(vec3(0.15, 0.14, 0.14), vec3(0.31, 0.32, 0.34), 0.5 + 0.5 * n.y);
+    vec3 light = room + 0.88 * lamp(n, key, 0.15) + vec3(0.13, 0.14, 0.16) * lamp(n, fill, 0.40);
     vec3 halfway = normalize(normalize(key) + towards_eye);
-    float gloss = 0.10 * pow(max(dot(n, halfway), 0.0), 40.0);
+    float gloss = 0.12 * pow(max(dot(n, halfway), 0.0), 50.0);
     float rim = 0.10 * pow(1.0 - max(dot(n, towards_eye), 0.0), 4.0);
     return base * light + gloss + rim;
 }
