@@ -15,7 +15,7 @@ COMMANDS = {
     "refine": "Turn a coarse polygon mesh into a dense mesh of a smooth surface.",
     "split": "Cut concave and many-sided faces into convex ones.",
     "marks": "Write the sharp features of a mesh as a marks file.",
-    "render": "Draw meshes into a PNG picture: shaded, with their edges, or reflection lines.",
+    "render": "Draw meshes side by side into a PNG picture.",
     "schemes": "List the surface schemes and their options.",
 }
 

@@ -133,7 +133,7 @@ PICTURE, LOOK = "Picture", "Look"
     options.messages,
 )
 def command(**given: Any) -> None:
-    """Draw meshes side by side into a PNG file.
+    """Draw meshes side by side into a PNG picture.
 
     The camera sees all of each mesh. Normals of the file are used as they are, so that creases show. The picture is
     drawn with OpenGL, without a display; a GPU is used where there is one, and none is needed. '-' is standard input

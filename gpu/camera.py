@@ -140,6 +140,10 @@ def fit_cameras(
 
 
 def _depth_range(nearest: float, farthest: float) -> tuple[float, float]:
-    """Near and far plane around these distances, with a little room."""
-    room = 0.02 * (farthest - nearest) + 0.01 * nearest
-    return max(nearest - room, 0.2 * nearest), farthest + room
+    """Near and far plane around these distances.
+
+    There is much room behind: surfaces are drawn farther away than they are, so that the lines on them stay in front,
+    and where they are steep that is far.
+    """
+    extent = farthest - nearest + 0.01 * nearest
+    return max(nearest - 0.02 * extent, 0.2 * nearest), farthest + 8 * extent

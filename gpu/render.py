@@ -206,6 +206,7 @@ class _Drawing:
             _write_color(target, True)
             _set(self.painter.surface, style=_STYLES[self.style])
         ctx.enable_only(moderngl.DEPTH_TEST)
+        ctx.depth_func = "<="
         ctx.polygon_offset = (self.lift, 1.0)
         self.triangles.render(moderngl.TRIANGLES)
         ctx.polygon_offset = (0.0, 0.0)

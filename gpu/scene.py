@@ -127,8 +127,9 @@ class Place:
     scale: float
 
     def __call__(self, points: Floats) -> Floats:
-        """Points ``(n,3)`` of a mesh in the drawn world, float32."""
-        return ((points - self.center) * self.scale).astype(np.float32)
+        """Points ``(n,3)`` of a mesh in the drawn world, float32; infinite where nothing that is shown can be."""
+        with np.errstate(over="ignore"):
+            return ((points - self.center) * self.scale).astype(np.float32)
 
 
 def place_panels(

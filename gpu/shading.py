@@ -11,7 +11,8 @@ from curvify.polygons import newell_normals
 from curvify.topology import Topology, build_topology, clean_loops, components, corner_links, weld_vertices
 
 SHADINGS = ("auto", "flat", "smooth")
-#: Faces that meet at more degrees than this, on average over the edges' length, are a coarse mesh: its faces show.
+#: Where the edges that are not sharp bend by more degrees than this, on average over their length, a mesh is coarse
+#: and shows its faces.
 COARSE = 10.0
 #: Meshes with more faces than this are never coarse: what they bend by is detail.
 FINE = 10_000
@@ -50,7 +51,7 @@ def _averaged(mesh: PolygonMesh, sharp: float | None) -> Floats:
     a, b = corner_links(topology)
     angles = degrees_between(area[topology.faces[a]], area[topology.faces[b]])
     if sharp is None:
-        coarse = mesh.face_count <= FINE and _mean_angle(mesh.positions, topology, angles) > COARSE
+        coarse = mesh.face_count <= FINE and _mean_bend(mesh.positions, topology, angles) > COARSE
         sharp = 0.0 if coarse else SHARP
     soft = angles <= sharp
     sectors = components(len(topology.vertices), a[soft], b[soft])
@@ -58,10 +59,11 @@ def _averaged(mesh: PolygonMesh, sharp: float | None) -> Floats:
     return normals
 
 
-def _mean_angle(positions: Floats, topology: Topology, angles: Floats) -> float:
-    """Mean of the angles at the interior edges, each given at both of its ends, weighted by length."""
+def _mean_bend(positions: Floats, topology: Topology, angles: Floats) -> float:
+    """Mean over the length of the edges that are not sharp of the angles, each given at both ends of its edge."""
     one = np.flatnonzero(topology.twin > np.arange(len(topology.twin)))
+    bends = angles[: len(one)]
     step = positions[topology.vertices[one]] - positions[topology.vertices[topology.next[one]]]
-    length = np.linalg.norm(step, axis=1)
+    length = np.linalg.norm(step, axis=1) * (bends <= SHARP)
     total = float(length.sum())
-    return float((angles[: len(one)] * length).sum()) / total if total else 0.0
+    return float((bends * length).sum()) / total if total else 0.0
