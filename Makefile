@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint goldens clean
+.PHONY: demo test lint goldens pictures clean
 
 $(VENV)/demo.stamp: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -32,6 +32,10 @@ test: lint
 
 goldens: $(VENV)/test.stamp
 	$(BIN)/python -m pytest tests/test_goldens.py --update-goldens
+
+# The pictures of the README; they need OpenGL, which Mesa provides in software.
+pictures: $(VENV)/demo.stamp
+	$(BIN)/python docs/pictures/make_pictures.py
 
 clean:
 	rm -rf $(VENV) build

@@ -1,0 +1,64 @@
+"""Draw the pictures of the README: ``python docs/pictures/make_pictures.py [FOLDER]``, or ``make pictures``.
+
+They are written beside this file unless a folder is given. The same device gives the same bytes; another one may
+differ in a last bit here and there.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import curvify
+from curvify.formats.marks_json import read_marks
+from curvify.gpu.device import Device, open_device
+from curvify.gpu.picture import picture, to_png
+from curvify.gpu.scene import Layer, Panel, Settings, Stroke
+
+HERE = Path(__file__).resolve().parent
+SAMPLES = HERE.parents[1] / "sample_meshes"
+EDGES = Stroke(width=1.2)
+
+
+def sample(name: str) -> curvify.PolygonMesh:
+    """A sample mesh."""
+    return curvify.read(SAMPLES / f"{name}.obj")
+
+
+def refined(device: Device) -> bytes:
+    """Coarse meshes and the surfaces made from them, one smooth all over and one with sharp edges."""
+    pawn, knob = sample("pawn"), sample("knob")
+    hard = read_marks(SAMPLES / "knob-hard.json")
+    panels = [
+        Panel([Layer(pawn, wire=EDGES)], f"{pawn.face_count} polygons"),
+        Panel([Layer(curvify.refine(pawn, level=12))], "their smooth surface"),
+        Panel([Layer(knob, wire=EDGES)], f"{knob.face_count} polygons"),
+        Panel([Layer(curvify.refine(knob, level=12, marks=hard))], "with some edges sharp"),
+    ]
+    return to_png(picture(panels, Settings(size=(300, 300), background=None, fit="each"), device))
+
+
+def reflections(device: Device) -> bytes:
+    """Reflection lines of flat faces, of averaged normals, and of the surface."""
+    coarse = sample("torus")
+    panels = [
+        Panel([Layer(coarse, "zebra", "flat")], "flat faces"),
+        Panel([Layer(coarse, "zebra", "smooth")], "normals averaged"),
+        Panel([Layer(curvify.refine(coarse, level=12), "zebra")], "refined by curvify"),
+    ]
+    settings = Settings(size=(400, 300), background=None, stripes=8, view=(20.0, 35.0))
+    return to_png(picture(panels, settings, device))
+
+
+PICTURES = {"refined.png": refined, "reflections.png": reflections}
+
+
+def main(folder: Path) -> None:
+    """Write all pictures into a folder, on nothing, so that they suit light and dark pages."""
+    with open_device() as device:
+        for name, draw in PICTURES.items():
+            (folder / name).write_bytes(draw(device))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE)
