@@ -197,21 +197,30 @@ class _Drawing:
 
     def draw(self) -> None:
         """Draw the layer over what is there."""
+        if self.style != "hidden":
+            _set(self.painter.surface, style=_STYLES[self.style])
+            self._draw_surface(colored=True)
+        if self.strokes:
+            self._draw_surface(colored=False)
+            self._draw_strokes()
+
+    def _draw_surface(self, colored: bool) -> None:
+        """Draw the triangles: their colors, or depths for the lines, pushed back as far as lines need it.
+
+        Colors are not drawn pushed back, or what lies behind a steep face would show at its silhouette.
+        """
         import moderngl
 
         ctx, target = self.ctx, self.painter.drawn
         _write_color(target, False)
         target.clear()  # the depth alone: what earlier layers hid, this one covers
-        if self.style != "hidden":
-            _write_color(target, True)
-            _set(self.painter.surface, style=_STYLES[self.style])
+        _write_color(target, colored)
         ctx.enable_only(moderngl.DEPTH_TEST)
         ctx.depth_func = "<="
-        ctx.polygon_offset = (self.lift, 1.0)
+        ctx.polygon_offset = (0.0, 0.0) if colored else (self.lift, 1.0)
         self.triangles.render(moderngl.TRIANGLES)
         ctx.polygon_offset = (0.0, 0.0)
         _write_color(target, True)
-        self._draw_strokes()
 
     def _draw_strokes(self) -> None:
         """Draw the lines over the surface, first what it hides of them."""

@@ -252,6 +252,13 @@ def test_a_surface_hides_the_lines_behind_it(device):
         assert dark[SIZE // 2, middle].max() == pytest.approx(seen, abs=0.02)
 
 
+def test_the_inside_of_a_closed_mesh_does_not_shine_through(device):
+    panel = Panel([Layer(truncated_icosahedron(), wire=Stroke(width=4.0))])
+    for view in ((0.0, 0.0), (30.0, 25.0), (75.0, -40.0)):
+        image = picture([panel], Settings(**FRONT | {"view": view}), device).astype(int)
+        assert not (image[..., 0] > image[..., 2] + 4).any()
+
+
 def test_lines_on_a_steep_surface_are_whole(device):
     edge = Lines(np.array([[[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]]]), BLACK)
     dark = darkness(Layer(square(), lines=[edge]), device, **(FRONT | {"view": (90.0, 8.0)}))
