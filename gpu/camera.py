@@ -107,12 +107,12 @@ def view_rotation(azimuth: float, elevation: float, up: str = "z") -> Floats:
 
 
 def fit_cameras(
-    points: Floats, rotations: Sequence[Floats], aspect: float, field_of_view: float = FIELD_OF_VIEW
+    points: Sequence[Floats], rotations: Sequence[Floats], aspect: float, field_of_view: float = FIELD_OF_VIEW
 ) -> list[Camera]:
-    """The closest eye from which all points ``(n,3)`` are seen however they are turned, as a camera per rotation.
+    """The closest eye that sees each set of points ``(n,3)`` turned by its rotation, as a camera for each.
 
-    With one rotation that is the fitted camera of a view; with those of a turntable it stays where it is, and the mesh
-    turns around the world's origin. ``aspect`` is width over height of the picture, ``field_of_view`` the angle across
+    With one set that is the fitted camera of a view; with the rotations of a turntable the eye stays where it is, and
+    the mesh turns around the origin. ``aspect`` is width over height of the picture, ``field_of_view`` the angle across
     its shorter side in degrees, 0 for a parallel projection. Points in one place are seen from some way off.
     """
     shape = np.array([aspect, 1.0]) / min(aspect, 1.0)
@@ -121,13 +121,13 @@ def fit_cameras(
     slope = spread * (1 - 2 * MARGIN)
     lean = slope[:, None] if perspective else np.zeros((2, 1))
     right, left, depths = np.full(2, -np.inf), np.full(2, -np.inf), []
-    for rotation in rotations:
-        across, depth = np.split(rotation @ points.T, [2])
+    for part, rotation in zip(points, rotations, strict=True):
+        across, depth = np.split(rotation @ part.T, [2])
         right = np.maximum(right, (across + lean * depth).max(axis=1))
         left = np.maximum(left, (lean * depth - across).max(axis=1))
         depths.append((float(depth.min()), float(depth.max())))
     highest = max(high for _, high in depths)
-    size = max(float(np.ptp(points, axis=0).max()), 1e-6 * float(np.abs(points).max()), 1e-30)
+    size = max(1e-30, *(max(np.ptp(part, axis=0).max(), 1e-6 * np.abs(part).max()) for part in points))
     reach = float(((right + left) / (2 * slope)).max())
     if not perspective:
         spread = shape * max(reach, size / 1000)

@@ -13,6 +13,7 @@ from curvify.gpu.camera import FIELD_OF_VIEW, UPS, VIEWS, WIDEST, Camera, fit_ca
 from curvify.gpu.colors import Color
 from curvify.gpu.triangles import shown_faces
 from curvify.mesh import DenseMesh, Floats, PolygonMesh
+from curvify.prepare import LARGEST_COORDINATE
 
 #: How a layer's surface looks; ``hidden`` shows nothing but hides the lines behind it.
 STYLES = ("shaded", "zebra", "normals", "values", "hidden")
@@ -111,6 +112,8 @@ class Settings:
                 f"{panels} x {width}x{height} pixels: a picture may have {LARGEST_SIDE} in each direction and "
                 f"{MOST_PIXELS >> 20} million in all; choose a smaller --size"
             )
+        if self.stripes < 1 or (self.columns is not None and self.columns < 1):
+            raise OptionError(f"stripes and columns must be 1 or more, not {self.stripes} and {self.columns}")
         if self.up not in UPS:
             raise OptionError(f"up must be one of {', '.join(UPS)}, not {self.up!r}")
         if self.fit not in FITS:
@@ -135,16 +138,22 @@ class Place:
 def place_panels(
     points: Sequence[Floats], views: Sequence[tuple[float, float]], settings: Settings
 ) -> list[tuple[Place, Camera]]:
-    """For the points ``(n,3)`` and the view of each panel: where its world lies, and the camera that sees it."""
+    """For the points ``(n,3)`` and the view of each panel: where its world lies, and the camera that sees it.
+
+    Raises MeshError for points that are too far away to be computed with.
+    """
     boxes = np.array([[part.min(axis=0), part.max(axis=0)] for part in points])
+    if np.abs(boxes).max() > LARGEST_COORDINATE:
+        extent = float(np.abs(boxes).max())
+        raise MeshError(f"a coordinate is as large as {extent:.3g}; scale the mesh below {LARGEST_COORDINATE:.0e}")
     together = settings.fit == "same" or (settings.fit == "auto" and nearly_same(boxes))
     groups = [list(range(len(points)))] if together else [[k] for k in range(len(points))]
     result: list[tuple[Place, Camera]] = [None] * len(points)  # type: ignore[list-item]
     for group in groups:
         low, high = boxes[group, 0].min(axis=0), boxes[group, 1].max(axis=0)
         size = float((high - low).max())
-        place = Place((low + high) / 2, 1 / size if size > 0 else 1.0)
-        seen = np.concatenate([place(points[k]) for k in group])
+        place = Place((low + high) / 2, 1 / max(size, 1 / LARGEST_COORDINATE))
+        seen = [place(points[k]) for k in group]
         rotations = [view_rotation(*views[k], settings.up) for k in group]
         cameras = fit_cameras(seen, rotations, settings.size[0] / settings.size[1], settings.field_of_view)
         for k, camera in zip(group, cameras, strict=True):

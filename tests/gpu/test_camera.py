@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from curvify.errors import OptionError
+from curvify.errors import MeshError, OptionError
 from curvify.gpu.camera import MARGIN, VIEWS, fit_cameras, parse_view, view_rotation
 from curvify.gpu.scene import Settings, nearly_same, place_panels
 
@@ -25,7 +25,7 @@ INSIDE = 1 - 2 * MARGIN
 def test_the_fitted_camera_is_the_closest_that_sees_everything(cloud, aspect, field):
     for view in [(30, 25), (0, 0), (200, -50), (0, 90)]:
         points = CLOUDS[cloud]
-        camera = fit_cameras(points, [view_rotation(*view)], aspect, field)[0]
+        camera = fit_cameras([points], [view_rotation(*view)], aspect, field)[0]
         seen = camera.project(points)
         assert np.abs(seen).max() <= INSIDE + 1e-9
         # The tighter direction is filled from margin to margin, unless the eye would come too close to the points.
@@ -42,7 +42,7 @@ def test_the_fitted_camera_is_the_closest_that_sees_everything(cloud, aspect, fi
 
 @pytest.mark.parametrize("field", [0.0, 24.0])
 def test_points_in_one_place_are_seen(field):
-    camera = fit_cameras(np.full((3, 3), 7.0), [view_rotation(10, 20)], 1.5, field)[0]
+    camera = fit_cameras([np.full((3, 3), 7.0)], [view_rotation(10, 20)], 1.5, field)[0]
     np.testing.assert_allclose(camera.project(np.full((1, 3), 7.0)), 0, atol=1e-6)
     assert 0 < camera.near < camera.far
 
@@ -95,10 +95,15 @@ def test_what_is_no_view(text):
 
 def test_a_turntable_turns_before_one_eye():
     points = CLOUDS["cloud"]
-    cameras = fit_cameras(points, [view_rotation(angle, 20) for angle in range(0, 360, 45)], 1.0)
+    cameras = fit_cameras([points] * 8, [view_rotation(angle, 20) for angle in range(0, 360, 45)], 1.0)
     for camera in cameras:
         np.testing.assert_array_equal(camera.eye, cameras[0].eye)
         assert np.abs(camera.project(points)).max() <= INSIDE + 1e-9
+
+
+def test_points_too_far_away_to_compute_with():
+    with pytest.raises(MeshError, match="1e\\+31"):
+        place_panels([CLOUDS["cloud"], np.array([[0, 0, 0], [1e31, 0, 0]])], [(0.0, 0.0)] * 2, Settings())
 
 
 def test_versions_of_a_mesh_share_a_camera_and_others_do_not():
@@ -120,6 +125,8 @@ def test_versions_of_a_mesh_share_a_camera_and_others_do_not():
     [
         {"size": (0, 5)},
         {"size": (17000, 5)},
+        {"stripes": 0},
+        {"columns": 0},
         {"up": "x"},
         {"fit": "all"},
         {"field_of_view": 121},
