@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from curvify import evaluate
+from curvify.backends import Backend
 from curvify.errors import OptionError
 from curvify.mesh import Floats, Ints
 from curvify.schemes.base import PatchClass, Patches
@@ -53,9 +53,11 @@ def dense_layout(patches: Patches, numbering: Numbering, dtype: np.dtype[Any]) -
     )
 
 
-def dense_jobs(patches: Patches, numbering: Numbering, layout: DenseLayout) -> list[tuple[int, Job]]:
+def dense_jobs(
+    patches: Patches, numbering: Numbering, layout: DenseLayout, backend: Backend
+) -> list[tuple[int, Job]]:
     """All jobs in the order of the file, each with the number of samples it stands for."""
-    work = _Evaluation(patches, numbering, layout)
+    work = _Evaluation(patches, numbering, layout, backend)
     outer = len(patches.topology.edges) - len(patches.inner_faces)
     repeated = numbering.repeats
     jobs: list[tuple[int, Job]] = []
@@ -82,8 +84,8 @@ def dense_jobs(patches: Patches, numbering: Numbering, layout: DenseLayout) -> l
 class _Evaluation:
     """The jobs of one dense mesh."""
 
-    def __init__(self, patches: Patches, numbering: Numbering, layout: DenseLayout) -> None:
-        self.patches, self.numbering, self.layout = patches, numbering, layout
+    def __init__(self, patches: Patches, numbering: Numbering, layout: DenseLayout, backend: Backend) -> None:
+        self.patches, self.numbering, self.layout, self.backend = patches, numbering, layout, backend
         self.tolerance = SERIES_TOLERANCE[layout.vertex_type["position"].base.name]
         self.colors = corner_colors(patches)
         self.first_half_edges = sides_of_edges(patches.topology)[0]
@@ -146,10 +148,8 @@ class _Evaluation:
         t = numbering.abscissae
         records = self._records(len(edges) * len(t)).reshape(len(edges), len(t))
         turn = np.flatnonzero(numbering.reversed[edges])
-        for name, values in (
-            ("position", evaluate.edge_points(patches.curves[:, edges], t)),
-            ("normal", evaluate.edge_normals(patches.fields[:, fields], t)),
-        ):
+        positions, normals = self.backend.edges(patches.curves[:, edges], patches.fields[:, fields], t)
+        for name, values in (("position", positions), ("normal", normals)):
             values[:, turn] = values[:, turn, ::-1]
             for i in range(3):
                 records[name][..., i] = values[i]
@@ -193,7 +193,7 @@ class _Evaluation:
         together = len(rows) * samples == len(records)
         target = records if together else self._records(len(rows) * samples)
         target = target.reshape(len(rows), samples)
-        evaluate.fill_patches(
+        self.backend.fill_patches(
             self.patches,
             patch_class,
             rows,

@@ -7,6 +7,7 @@ take jobs in order; a sink that can write anywhere takes blocks as they come, th
 from __future__ import annotations
 
 import os
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from curvify import evaluate
 from curvify.arrays import cross
+from curvify.backends import Backend, open_backend
 from curvify.errors import LimitError, OptionError
 from curvify.jobs import dense_jobs, dense_layout
 from curvify.mesh import DenseMesh, Floats, Ints, PolygonMesh
@@ -96,12 +98,14 @@ class Surface:
         threads: int | None = None,
         max_faces: int = MAX_FACES,
         progress: Progress | None = None,
+        backend: str | Backend = "cpu",
     ) -> DenseLayout:
         """Evaluate the dense mesh of level k into a sink, block by block.
 
         ``dtype`` float32 or float64 is the type of positions, normals and texture coordinates; ``threads`` (default:
-        one per processor) does not change the result; ``progress(done, of)`` is told about samples.
-        Raises OptionError for a level below 1, LimitError for more faces than ``max_faces``.
+        one per processor) does not change the result; ``progress(done, of)`` is told about samples; ``backend`` is an
+        open one, or ``cpu``, ``gpu`` or ``auto``. Raises OptionError for a level below 1, LimitError for more faces
+        than ``max_faces``, DeviceError for ``gpu`` where there is none.
         """
         if int(level) != level or level < 1:
             raise OptionError(f"the level must be a whole number from 1 on, not {level!r}")
@@ -113,9 +117,11 @@ class Surface:
             )
         numbering = number_dense_mesh(self.patches, int(level))
         layout = dense_layout(self.patches, numbering, np.dtype(dtype))  # type: ignore[call-overload]
-        sink.begin(layout)
-        run_jobs(dense_jobs(self.patches, numbering, layout), sink, threads, progress)
-        sink.end()
+        opened = open_backend(backend, layout.vertex_count) if isinstance(backend, str) else nullcontext(backend)
+        with opened as evaluator:
+            sink.begin(layout)
+            run_jobs(dense_jobs(self.patches, numbering, layout, evaluator), sink, threads, progress)
+            sink.end()
         return layout
 
     def write(
@@ -160,6 +166,7 @@ def refine(
     threads: int | None = None,
     max_faces: int = MAX_FACES,
     weld_normals: bool = False,
+    backend: str | Backend = "cpu",
     **options: Any,
 ) -> DenseMesh:
     """Refine a polygon mesh: every edge becomes 2 ``level`` segments.
@@ -171,7 +178,7 @@ def refine(
     made = surface(mesh, scheme, **options)
     if weld_normals:
         made = made.weld_normals()
-    return made.refine(level, dtype, threads=threads, max_faces=max_faces)
+    return made.refine(level, dtype, threads=threads, max_faces=max_faces, backend=backend)
 
 
 def _check_inside(sides: Ints, points: Floats) -> None:

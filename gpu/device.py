@@ -111,6 +111,7 @@ class Device:
 
     def __post_init__(self) -> None:
         self._open = True
+        _ = self.ctx.info  # kept by the context; asked for later, from another thread, it would be empty
         self._pixel = self.ctx.simple_framebuffer((1, 1))
         self._pixel.use()
 

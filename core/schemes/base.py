@@ -59,12 +59,15 @@ class Form:
     """A vector function on the faces of one class.
 
     ``key`` identifies the basis (for caches); ``basis(points (S,2))`` gives its tables;
-    ``controls(rows)`` the control data of some of the class's faces.
+    ``controls(rows)`` the control data of some of the class's faces. The first ``points`` control vectors are points,
+    whose weights sum to 1, the others differences of points: a backend of low precision then moves them to an origin
+    near each face. With none, positions are evaluated where they are.
     """
 
     key: Hashable
     basis: Callable[[Floats], Basis]
     controls: Callable[[Ints], Controls]
+    points: int = 0
 
 
 @dataclass(frozen=True, eq=False)

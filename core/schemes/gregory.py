@@ -134,6 +134,7 @@ def _patch_class(
         lambda rows: GregoryControls.build(
             work, corners[rows], uneven, options.cross_tangent, shape.bulge[patches[rows]], shape.alpha[patches[rows]]
         ),
+        points=3 * sides,
     )
     if options.normals == "exact":
         return PatchClass(sides, patches, surface)

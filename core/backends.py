@@ -1,0 +1,99 @@
+"""What evaluates a surface: the interface of a backend, the CPU's, and how one is found by name.
+
+The GPU's is imported only when it is asked for, or worth it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Protocol
+
+from curvify import evaluate
+from curvify.errors import DeviceError, OptionError
+from curvify.mesh import Floats, Ints
+from curvify.sampling import Sampling
+from curvify.schemes.base import PatchClass, Patches
+
+if TYPE_CHECKING:
+    from curvify.gpu.evaluate import GpuBackend
+
+NAMES = ("auto", "cpu", "gpu")
+#: Samples from which `auto` looks for a GPU: below, the CPU is done before a context is open.
+LARGE = 5_000_000
+
+
+class Backend(Protocol):
+    """Evaluates edges and the insides of patches; its methods may be called from several threads at once."""
+
+    name: str
+
+    def edges(self, curves: Floats, fields: Floats, t: Floats) -> tuple[Floats, Floats]:
+        """Positions and unit normals ``(3,e,m)`` at ``t (m,)`` on edges with Bezier points ``curves (3,e,d+1)`` and
+        normal fields ``(3,e,q+1)``.
+        """
+
+    def fill_patches(
+        self,
+        patches: Patches,
+        patch_class: PatchClass,
+        rows: Ints,
+        sampling: Sampling,
+        level: int,
+        tolerance: float,
+        positions: Floats,
+        normals: Floats,
+    ) -> None:
+        """Write into ``positions`` and ``normals (f,S,3)``, as ``evaluate.fill_patches`` does."""
+
+    def describe(self) -> dict[str, Any]:
+        """What it is, for the report."""
+
+    @property
+    def bytes_sent(self) -> int:
+        """Bytes sent to a device so far."""
+
+
+class CpuBackend:
+    """Float64 on the processor."""
+
+    name = "cpu"
+    bytes_sent = 0
+    fill_patches = staticmethod(evaluate.fill_patches)
+
+    def edges(self, curves: Floats, fields: Floats, t: Floats) -> tuple[Floats, Floats]:
+        """Positions and unit normals of edges."""
+        return evaluate.edge_points(curves, t), evaluate.edge_normals(fields, t)
+
+    def describe(self) -> dict[str, Any]:
+        """Nothing but its name."""
+        return {"name": self.name}
+
+
+@contextmanager
+def open_backend(name: str, samples: int) -> Iterator[Backend]:
+    """The backend of a name, for about so many samples; a device is closed at the end.
+
+    ``auto`` is the GPU where there is one that is no software and the work is large, the CPU otherwise.
+    Raises OptionError for a name that is none, DeviceError for ``gpu`` without a device.
+    """
+    if name not in NAMES:
+        raise OptionError(f"the backend must be one of {', '.join(NAMES)}, not {name!r}")
+    gpu = None if name == "cpu" or (name == "auto" and samples < LARGE) else _open_gpu(name == "gpu")
+    if gpu is None:
+        yield CpuBackend()
+        return
+    with gpu:
+        yield gpu
+
+
+def _open_gpu(asked: bool) -> GpuBackend | None:
+    """The GPU backend; unless ``asked`` for, None where there is no device or only software that acts as one."""
+    from curvify.gpu.evaluate import GpuBackend
+
+    try:
+        return GpuBackend(software=asked)
+    except DeviceError:
+        if asked:
+            raise
+        return None
