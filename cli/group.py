@@ -17,6 +17,7 @@ COMMANDS = {
     "marks": "Write the sharp features of a mesh as a marks file.",
     "render": "Draw meshes side by side into a PNG picture.",
     "schemes": "List the surface schemes and their options.",
+    "backends": "List what can evaluate surfaces: the processor, and the GPU that was found.",
 }
 
 

@@ -167,7 +167,7 @@ backend = option(
     type=click.Choice(["auto", "cpu", "gpu"]),
     default="auto",
     show_default=True,
-    help="What evaluates the surface; this version has the CPU only.",
+    help="What evaluates the surface; 'auto' is the GPU for large work if there is one, 'curvify backends' explains.",
 )
 threads = option(
     RUNNING,

@@ -134,7 +134,7 @@ def refine_report(run: Run, layout: DenseLayout, recorder: Recorder) -> dict[str
         "scheme": request.scheme,
         "options": run.all_options,
         "level": request.level,
-        "backend": {"name": "cpu", "threads": run.threads},
+        "backend": run.backend | {"threads": run.threads},
         "counts": {
             "input": patches.counts,
             "output": {
@@ -145,7 +145,7 @@ def refine_report(run: Run, layout: DenseLayout, recorder: Recorder) -> dict[str
             },
         },
         "timings": run.seconds,
-        "bytes_sent_to_gpu": 0,
+        "bytes_sent_to_gpu": run.bytes_sent,
         "g1": continuity(patches),
         "vertex_deviation": _number(recorder.deviation),
         "vertex_rounding": _number(recorder.rounding),

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from curvify.backends import Backend, open_backend
 from curvify.cli import files
 from curvify.cli.console import Console, size
 from curvify.cli.predict import predicted_bytes, predicted_faces
@@ -94,6 +95,8 @@ class Run:
     warnings: list[str]
     seconds: dict[str, float] = field(default_factory=dict)
     bytes: int | None = None
+    backend: dict[str, Any] = field(default_factory=dict)
+    bytes_sent: int = 0
 
     @property
     def triangulate(self) -> bool:
@@ -162,8 +165,6 @@ def plain_options(options: Any) -> dict[str, Any]:
 
 def check(request: Request) -> tuple[Any, str]:
     """The scheme's options and the format of OUT. Raises CurvifyError for what can be seen to fail beforehand."""
-    if request.backend == "gpu":
-        raise OptionError("this version has no GPU backend yet; leave out --backend or choose cpu")
     options = load_scheme(request.scheme).Options(**request.scheme_options)
     format = files.check_output(request.output, request.output_format, request.no_clobber)
     if request.ascii and format != "ply":
@@ -230,17 +231,27 @@ def _refine(run: Run, console: Console) -> None:
     options = ", ".join(f"{name} {value}" for name, value in plain_options(run.options).items())
     console.explain(f"{request.source}: {_sizes(run.surface.patches.counts)}")
     console.explain(f"scheme {request.scheme}, level {request.level}, {options}, {run.dtype.name}")
-    console.explain(f"backend cpu, {count_of(run.threads, 'thread')}")
     recorder = Recorder(run.surface.patches) if request.report is not None else None
-    with timed(run.seconds, "evaluate_and_write"):
-        layout = _write(run, recorder, console)
+    with ExitStack() as stack:
+        with timed(run.seconds, "open_backend"):
+            backend = stack.enter_context(open_backend(request.backend, run.surface.face_count(request.level)))
+        run.backend = backend.describe()
+        console.explain(f"backend {_backend_name(run.backend)}, {count_of(run.threads, 'thread')}")
+        with timed(run.seconds, "evaluate_and_write"):
+            layout = _write(run, recorder, console, backend)
+        run.bytes_sent = backend.bytes_sent
     console.explain(f"{request.target}: {_dense_sizes(run, layout)}" + (f", {size(run.bytes)}" if run.bytes else ""))
     console.explain(", ".join(f"{stage.replace('_', ' ')} {took:.3f} s" for stage, took in run.seconds.items()))
     if request.report is not None and recorder is not None:
         write_report(request.report, refine_report(run, layout, recorder))
 
 
-def _write(run: Run, recorder: Recorder | None, console: Console) -> DenseLayout:
+def _backend_name(backend: dict[str, Any]) -> str:
+    """A backend in messages: ``cpu``, ``gpu (device)``."""
+    return f"{backend['name']} ({backend['renderer']})" if "renderer" in backend else str(backend["name"])
+
+
+def _write(run: Run, recorder: Recorder | None, console: Console, backend: Backend) -> DenseLayout:
     """Evaluate the surface into OUT."""
     request = run.request
     stdout = files.CountedStdout()
@@ -258,7 +269,13 @@ def _write(run: Run, recorder: Recorder | None, console: Console) -> DenseLayout
         if recorder is not None:
             sink = recorder.into(sink)
         layout = run.written.stream(
-            sink, request.level, run.dtype, threads=run.threads, max_faces=request.max_faces, progress=progress
+            sink,
+            request.level,
+            run.dtype,
+            threads=run.threads,
+            max_faces=request.max_faces,
+            progress=progress,
+            backend=backend,
         )
     if request.output == files.STREAM:
         run.bytes = stdout.count

@@ -7,7 +7,7 @@ parallel, side fields that no number of Chebyshev points describes) is left to t
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np

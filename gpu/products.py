@@ -39,7 +39,7 @@ class Table:
 
 
 def pack_columns(linear: Floats, nodes: Floats | None = None) -> Singles:
-    """Control vectors ``(3,f,L)``, and field values ``(3,f,n,m)``, as ``(f,3,K)``, K filled up to a multiple of four."""
+    """Control vectors ``(3,f,L)``, and field values ``(3,f,n,m)``, as ``(f,3,K)``: K a multiple of four."""
     patches, columns = linear.shape[1:]
     more = 0 if nodes is None else nodes.shape[2] * nodes.shape[3]
     packed = np.zeros((patches, 3, -(-(columns + more) // 4) * 4), dtype=np.float32)
