@@ -134,7 +134,7 @@ def _patch_class(
         lambda rows: GregoryControls.build(
             work, corners[rows], uneven, options.cross_tangent, shape.bulge[patches[rows]], shape.alpha[patches[rows]]
         ),
-        points=3 * sides,
+        points=sides,
     )
     if options.normals == "exact":
         return PatchClass(sides, patches, surface)
@@ -183,7 +183,8 @@ class GregoryControls:
         corrected = target is not None
         if corrected:
             slope = slope + value * side_speed(n, t)[1]  # T' = s F' + s' F, and s = 1 at the ends
-        blocks = [points, curves[..., 1], curves[..., 2], slope[..., 0], slope[..., 2]]
+        legs = curves[..., 1] - points, curves[..., 2] - np.roll(points, -1, axis=2)
+        blocks = [points, *legs, slope[..., 0], slope[..., 2]]
         if corrected and n != 4:
             blocks.append(value[..., 1])
         linear = np.zeros((3, len(corners), n * len(blocks) + corrected))

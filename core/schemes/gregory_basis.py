@@ -2,7 +2,8 @@
 
 Source: Leung, Wang, Zhang, equations (1), (3), (4) (J. Gregory's corner interpolators), written as one linear
 combination per face; the polynomial correction and the center function are ours (docs/mathematics.md).
-Per side k of a face the control vectors are, in this order, the Bezier points p_k, Q0_k, Q1_k of its edge and the
+Per side k of a face the control vectors are, in this order, the corner p_k, the legs Q0_k - p_k and Q1_k - p_{k+1} of
+its edge's Bezier points (legs, since points of many-sided patches would have large weights that cancel), the
 derivative of the cross tangent at its two ends, T'_k(0), T'_k(1); then, for the corrected patch, T_k(1/2)/s(1/2)
 (n != 4) and one vector that moves the center. The cross tangents are the side fields, for the corrected patch over
 s_n, which stands in their weights.
@@ -32,7 +33,7 @@ def gregory_basis(sides: int, points: Floats, corrected: bool, uneven: bool = Fa
         weights = jet_product(weights, jet_compose(*side_speed(sides, domain.u[0]), domain.u))
         if sides != 4:
             p, tau0, tau1, middle = _correction(sides, points, domain, uneven)
-            blocks[0] += p - 3 * tau0 + 3 * np.roll(tau1, 1, axis=1)
+            blocks[0] += p
             blocks[1] += 3 * tau0
             blocks[2] -= 3 * tau1
             blocks.append(middle)
@@ -67,7 +68,7 @@ def _field_weights(domain: Domain) -> Floats:
 
 
 def _plain_columns(domain: Domain) -> list[Floats]:
-    """Columns of p, Q0, Q1, T'(0), T'(1): jets ``(3,n,S)`` each."""
+    """Columns of p, Q0 - p, Q1 - p_{k+1}, T'(0), T'(1): jets ``(3,n,S)`` each."""
     u, v, w = domain.u, domain.v, domain.w
     both = w + np.roll(w, -1, axis=1)
     values = bernstein_basis(3, u[0])
@@ -76,7 +77,7 @@ def _plain_columns(domain: Domain) -> list[Floats]:
     at_start = _twist(u, v)
     at_end = _twist(v, u)
     return [
-        curve[0] + np.roll(curve[3], 1, axis=1) - w,
+        curve[0] + curve[1] + np.roll(curve[2] + curve[3], 1, axis=1) - w,
         curve[1],
         curve[2],
         -jet_product(w, at_start),
