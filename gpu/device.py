@@ -8,6 +8,7 @@ platform's own way, ``none`` to act as if there were no OpenGL at all.
 from __future__ import annotations
 
 import os
+import re
 import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -150,9 +151,9 @@ def open_device() -> Device:
 
 def _ways(choice: str) -> list[tuple[str, dict[str, Any]]]:
     """Names and settings of the contexts to try, in order. Raises DeviceError for a choice that is none."""
-    kind, _, number = choice.partition(":")
-    if kind not in ("auto", "egl", "default") or (number and (kind != "egl" or not number.isdecimal())):
+    if not re.fullmatch(r"auto|egl(:[0-9]+)?|default", choice):
         raise DeviceError(f"{VARIABLE} must be egl, egl:NUMBER, default or none, not {choice!r}")
+    kind, _, number = choice.partition(":")
     linux = sys.platform.startswith("linux")
     # The libraries' names are known there: moderngl would run other programs to find them.
     egl = {"libgl": "libGL.so.1", "libegl": "libEGL.so.1"} if linux else {}

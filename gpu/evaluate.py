@@ -7,10 +7,12 @@ parallel, side fields that no number of Chebyshev points describes) is left to t
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from curvify import evaluate
 from curvify.errors import DeviceError
@@ -24,6 +26,38 @@ from curvify.schemes.base import Form, PatchClass, Patches, bernstein_basis
 NODE_COUNTS = (8, 12, 16, 24, 32, 48)
 #: What may be left out of the series of a side field, over its length: as much as single precision rounds away.
 SERIES_TOLERANCE = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Vectors:
+    """Vectors of some patches in single precision: ``columns (f,3,K)``, relative to ``origin (f,3)`` where they are
+    points, over ``scale``.
+    """
+
+    columns: Singles
+    scale: float
+    origin: Floats
+
+    @classmethod
+    def pack(cls, linear: Floats, points: int, nodes: Floats | None = None) -> Vectors:
+        """Of control vectors ``(3,f,L)``, the first ``points`` of which are points, and field values ``(3,f,n,m)``.
+
+        The origin is the first point in single precision: a result in single precision is then rounded only once.
+        """
+        patches = linear.shape[1]
+        origin = np.zeros((3, patches))
+        if points:
+            origin = linear[..., 0].astype(np.float32).astype(np.float64)
+            linear = np.concatenate([linear[..., :points] - origin[..., None], linear[..., points:]], axis=2)
+        fields = [] if nodes is None else [nodes.reshape(3, patches, -1)]
+        columns, scale = pack_columns(linear, *fields)
+        return cls(columns, scale, origin.T)
+
+    def restore(self, values: Singles, dtype: np.dtype[Any]) -> Floats:
+        """Points ``(f,S,3)`` in a type, from what was computed with the columns."""
+        points = values.astype(dtype) * dtype.type(self.scale)
+        points += self.origin[:, None].astype(dtype)
+        return points
 
 
 class GpuBackend:
@@ -63,12 +97,13 @@ class GpuBackend:
         """Positions and unit normals ``(3,e,m)`` at ``t (m,)`` on edges, as ``evaluate.edge_points``."""
         if not len(t):
             return np.empty((3, curves.shape[1], 0)), np.empty((3, fields.shape[1], 0))
-        columns, origin = _columns(curves, np.empty((3, curves.shape[1], 0, 0)), curves.shape[2])
-        local = self.products.multiply(VALUES, _edge_table(curves.shape[2], t), columns)
-        normals = self.products.multiply(UNIT, _edge_table(fields.shape[2], t), pack_columns(fields))
-        positions = local.astype(np.float64) + origin[:, None]
+        vectors = Vectors.pack(curves, curves.shape[2])
+        values = self.products.multiply(VALUES, _edge_table(curves.shape[2], t), vectors.columns)
+        positions = vectors.restore(values, curves.dtype)
+        directions = Vectors.pack(fields, 0)
+        normals = self.products.multiply(UNIT, _edge_table(fields.shape[2], t), directions.columns)
         result = normals.astype(np.float64).transpose(2, 0, 1)
-        lost = np.flatnonzero(~normals.any(axis=2).all(axis=1))
+        lost = np.flatnonzero(_without_normal(normals))
         if len(lost):
             result[:, lost] = evaluate.edge_normals(fields[:, lost], t)
         return positions.transpose(2, 0, 1), result
@@ -89,11 +124,11 @@ class GpuBackend:
             return
         fill = partial(self._fill, rows=rows, points=sampling.points, grid=(patch_class.sides, level))
         if patch_class.normals is None:
-            left = fill(patch_class.surface, NORMALS, targets=(positions, normals))
+            left = fill(patch_class.surface, NORMALS, positions=positions, normals=normals)
         else:
-            left = fill(patch_class.surface, VALUES, targets=(positions,))
-            left |= fill(patch_class.normals, UNIT, targets=(normals,))
-        left |= ~normals.any(axis=2).all(axis=1)
+            left = fill(patch_class.surface, VALUES, positions=positions)
+            left |= fill(patch_class.normals, UNIT, normals=normals)
+        left |= _without_normal(normals)
         if left.any():
             part = np.flatnonzero(left)
             exact = np.empty((2, len(part), *positions.shape[1:]))
@@ -108,38 +143,36 @@ class GpuBackend:
         rows: Ints,
         points: Floats,
         grid: tuple[int, int],
-        targets: tuple[Floats, ...],
+        positions: Floats | None = None,
+        normals: Floats | None = None,
     ) -> Bools:
-        """Write what a form gives into ``targets (f,S,3)``; returns which patches ``(f,)`` are left for the CPU."""
+        """Write what a form gives into ``positions`` and ``normals (f,S,3)``; which patches ``(f,)`` it left out."""
         left = np.arange(len(rows))
         controls = form.controls(rows)
         for count in NODE_COUNTS:
             nodes = controls.fields(evaluate.chebyshev_points(count))
-            fields = nodes.shape[2] > 0
-            enough = evaluate.enough_points(nodes, SERIES_TOLERANCE) if fields else np.ones(len(left), dtype=bool)
+            enough = _enough_points(nodes)
             part = np.flatnonzero(enough)
             if len(part):
-                columns, origin = _columns(controls.linear[:, part], nodes[:, part], form.points)
+                vectors = Vectors.pack(controls.linear[:, part], form.points, nodes[:, part])
                 for block in evaluate.tables(form, points, grid, count, kind.orders):
-                    table = _block_table(form, grid, count, block)
-                    values = self.products.multiply(kind, table, columns)
-                    _store(targets, left[part], slice(block.first, block.last), values, origin)
+                    values = self.products.multiply(kind, _block_table(form, grid, count, block), vectors.columns)
+                    place = _place(left[part]), slice(block.first, block.last)
+                    if positions is not None:
+                        positions[place] = vectors.restore(values[..., :3], positions.dtype)
+                    if normals is not None:
+                        normals[place] = values[..., -3:]
             left = left[~enough]
             if not len(left):
                 break
             controls = controls.take(np.flatnonzero(~enough))
         return np.isin(np.arange(len(rows)), left)
 
-
-def _columns(linear: Floats, nodes: Floats, points: int) -> tuple[Singles, Singles]:
-    """Columns ``(f,3,K)`` of control vectors ``(3,f,L)`` and field values, and the origins ``(f,3)`` of the points.
-
-    Origins are the first control vectors in single precision, so that the sum with them rounds once.
-    """
-    origin = linear[..., 0].T.astype(np.float32) if points else np.zeros((linear.shape[1], 3), dtype=np.float32)
-    local = linear.copy()
-    local[..., :points] -= origin.T[..., None]
-    return pack_columns(local, nodes), origin
+def _enough_points(nodes: Floats) -> Bools:
+    """Which patches ``(f,)`` have fields ``(3,f,n,m)`` at enough points; all of them where there are no fields."""
+    if not nodes.shape[2]:
+        return np.ones(nodes.shape[1], dtype=bool)
+    return evaluate.enough_points(nodes, SERIES_TOLERANCE)
 
 
 def _block_table(form: Form, grid: tuple[int, int], count: int, block: evaluate.Tables) -> Table:
@@ -155,10 +188,12 @@ def _edge_table(points: int, t: Floats) -> Table:
     return Table(("edge", points, t.tobytes()), len(t), bernstein_basis(points - 1, t))
 
 
-def _store(targets: tuple[Floats, ...], rows: Ints, samples: slice, values: Singles, origin: Singles) -> None:
-    """Write results ``(f,s,3)`` or ``(f,s,6)`` to some rows and samples of ``targets (F,S,3)``."""
-    together = rows[-1] - rows[0] == len(rows) - 1
-    place = (slice(rows[0], rows[-1] + 1) if together else rows, samples)
-    targets[0][place] = values[..., :3] + origin[:, None].astype(targets[0].dtype)
-    for target in targets[1:]:
-        target[place] = values[..., 3:]
+def _without_normal(normals: npt.NDArray[Any]) -> Bools:
+    """Rows ``(f,)`` of normals ``(f,S,3)`` one of which is zero: single precision gave none."""
+    there = (normals != 0).any(axis=2)
+    return ~there.all(axis=1)
+
+
+def _place(rows: Ints) -> Ints | slice:
+    """Ascending rows as an index: a slice where they lie side by side."""
+    return slice(rows[0], rows[-1] + 1) if rows[-1] - rows[0] == len(rows) - 1 else rows

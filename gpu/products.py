@@ -6,6 +6,7 @@ wait for the results, and meanwhile more of them can prepare theirs.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -38,15 +39,21 @@ class Table:
     matrix: Floats
 
 
-def pack_columns(linear: Floats, nodes: Floats | None = None) -> Singles:
-    """Control vectors ``(3,f,L)``, and field values ``(3,f,n,m)``, as ``(f,3,K)``: K a multiple of four."""
-    patches, columns = linear.shape[1:]
-    more = 0 if nodes is None else nodes.shape[2] * nodes.shape[3]
-    packed = np.zeros((patches, 3, -(-(columns + more) // 4) * 4), dtype=np.float32)
-    packed[..., :columns] = linear.transpose(1, 0, 2)
-    if nodes is not None:
-        packed[..., columns : columns + more] = nodes.reshape(3, patches, more).transpose(1, 0, 2)
-    return packed
+def pack_columns(*parts: Floats) -> tuple[Singles, float]:
+    """Vectors ``(3,f,L)``, in one or more parts, as ``(f,3,K)``, K a multiple of four; and the power of two that they
+    were divided by, so that products of four of them stay within single precision.
+    """
+    total = sum(part.shape[2] for part in parts)
+    packed = np.zeros((parts[0].shape[1], 3, -(-total // 4) * 4), dtype=np.float32)
+    largest = max(float(np.abs(part).max(initial=0.0)) for part in parts)
+    exponent = math.frexp(largest)[1] - 1 if 0 < largest < math.inf else 0
+    scale = 2.0 ** min(max(exponent, -126), 127)
+    begin = 0
+    for part in parts:
+        end = begin + part.shape[2]
+        np.multiply(part.transpose(1, 0, 2), 1 / scale, out=packed[..., begin:end], casting="same_kind")
+        begin = end
+    return packed, scale
 
 
 def pack_table(matrix: Floats, samples: int) -> Singles:

@@ -47,7 +47,7 @@ class Program:
         if device.compute:
             self._shader = device.ctx.compute_shader(_source(kind, 430, TILE, "compute"))
         else:
-            varyings = ["value", "normal"] if kind.orders == 3 else ["value"]
+            varyings = ("value", "normal") if kind.orders == 3 else ("value",)
             source = _source(kind, 330, (1, 1), "feedback")
             self._shader = device.ctx.program(vertex_shader=source, varyings=varyings)
             self._feedback = device.ctx.vertex_array(self._shader, [])
