@@ -86,7 +86,7 @@ class GpuBackend:
     @property
     def bytes_sent(self) -> int:
         """Bytes sent to the device so far."""
-        return self.products.sent
+        return self.products.bytes_sent
 
     def describe(self) -> dict[str, Any]:
         """Name and device."""
@@ -98,15 +98,19 @@ class GpuBackend:
         if not len(t):
             return np.empty((3, curves.shape[1], 0)), np.empty((3, fields.shape[1], 0))
         vectors = Vectors.pack(curves, curves.shape[2])
-        values = self.products.multiply(VALUES, _edge_table(curves.shape[2], t), vectors.columns)
-        positions = vectors.restore(values, curves.dtype)
-        directions = Vectors.pack(fields, 0)
-        normals = self.products.multiply(UNIT, _edge_table(fields.shape[2], t), directions.columns)
+        positions = vectors.restore(self._bezier(VALUES, vectors, curves.shape[2], t), curves.dtype)
+        normals = self._bezier(UNIT, Vectors.pack(fields, 0), fields.shape[2], t)
         result = normals.astype(np.float64).transpose(2, 0, 1)
         lost = np.flatnonzero(_without_normal(normals))
         if len(lost):
             result[:, lost] = evaluate.edge_normals(fields[:, lost], t)
         return positions.transpose(2, 0, 1), result
+
+    def _bezier(self, kind: Kind, vectors: Vectors, points: int, t: Floats) -> Singles:
+        """Bezier polynomials of so many points at the abscissae of edges: ``(e,m,3)``."""
+        table = Table(("edge", points, t.tobytes()), len(t), bernstein_basis(points - 1, t))
+        with self.products.sent(vectors.columns, len(t)) as sent:
+            return self.products.multiply(kind, table, sent)
 
     def fill_patches(
         self,
@@ -155,13 +159,15 @@ class GpuBackend:
             part = np.flatnonzero(enough)
             if len(part):
                 vectors = Vectors.pack(controls.linear[:, part], form.points, nodes[:, part])
-                for block in evaluate.tables(form, points, grid, count, kind.orders):
-                    values = self.products.multiply(kind, _block_table(form, grid, count, block), vectors.columns)
-                    place = _place(left[part]), slice(block.first, block.last)
-                    if positions is not None:
-                        positions[place] = vectors.restore(values[..., :3], positions.dtype)
-                    if normals is not None:
-                        normals[place] = values[..., -3:]
+                tables = evaluate.tables(form, points, grid, count, kind.orders)
+                with self.products.sent(vectors.columns, min(len(points), evaluate.SAMPLES)) as sent:
+                    for block in tables:
+                        values = self.products.multiply(kind, _block_table(form, grid, count, block), sent)
+                        place = _place(left[part]), slice(block.first, block.last)
+                        if positions is not None:
+                            positions[place] = vectors.restore(values[..., :3], positions.dtype)
+                        if normals is not None:
+                            normals[place] = values[..., -3:]
             left = left[~enough]
             if not len(left):
                 break
@@ -181,11 +187,6 @@ def _block_table(form: Form, grid: tuple[int, int], count: int, block: evaluate.
     samples = block.last - block.first
     orders = block.matrix.shape[1] // samples
     return Table((form.key, grid, count, orders, block.first), samples, block.matrix)
-
-
-def _edge_table(points: int, t: Floats) -> Table:
-    """Bernstein polynomials ``(d+1, m)`` at the abscissae of edges."""
-    return Table(("edge", points, t.tobytes()), len(t), bernstein_basis(points - 1, t))
 
 
 def _without_normal(normals: npt.NDArray[Any]) -> Bools:

@@ -7,22 +7,25 @@ wait for the results, and meanwhile more of them can prepare theirs.
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from curvify.errors import DeviceError
 from curvify.gpu.device import Device, open_device
-from curvify.gpu.programs import Kind, Program
+from curvify.gpu.programs import MOST_LENGTH, Kind, Program
 from curvify.mesh import Floats
 
 if TYPE_CHECKING:
     import moderngl
 
+P = ParamSpec("P")
+T = TypeVar("T")
 Singles = npt.NDArray[np.float32]
 #: Bytes of tables that stay on the device.
 MOST_TABLES = 256 << 20
@@ -65,13 +68,13 @@ def pack_table(matrix: Floats, samples: int) -> Singles:
 
 
 class Products:
-    """Products on one device. Close it at the end; ``sent`` counts the bytes that went to the device."""
+    """Products on one device. Close it at the end; ``bytes_sent`` counts the bytes that went to the device."""
 
     device: Device
 
     def __init__(self) -> None:
         """Open the device. Raises DeviceError."""
-        self.sent = 0
+        self.bytes_sent = 0
         self._tables: dict[Hashable, moderngl.Texture] = {}
         self._table_bytes = 0
         self._programs: dict[Kind, Program] = {}
@@ -88,30 +91,54 @@ class Products:
         self._thread.submit(self.device.close).result()
         self._thread.shutdown(cancel_futures=True)
 
-    def multiply(self, kind: Kind, table: Table, columns: Singles) -> Singles:
-        """Results ``(f,S,length)`` of a table and the columns ``(f,3,K)`` of some patches. Raises DeviceError."""
-        return self._thread.submit(self._multiply, kind, table, columns).result()
+    @contextmanager
+    def sent(self, columns: Singles, samples: int) -> Iterator[list[moderngl.Texture]]:
+        """The columns ``(f,3,K)`` of some patches on the device, for tables of up to so many ``samples``."""
+        textures = self._run(self._send, columns, samples)
+        try:
+            yield textures
+        finally:
+            self._run(self._release, textures)
 
-    def _multiply(self, kind: Kind, table: Table, columns: Singles) -> Singles:
+    def multiply(self, kind: Kind, table: Table, controls: list[moderngl.Texture]) -> Singles:
+        """Results ``(f,S,length)`` of a table and what was sent of some patches. Raises DeviceError."""
+        return self._run(self._multiply, kind, table, controls)
+
+    def _run(self, do: Callable[P, T], *args: P.args, **named: P.kwargs) -> T:
+        """Do something in the thread of the device, and wait for it."""
+        import moderngl
+
+        try:
+            return self._thread.submit(do, *args, **named).result()
+        except moderngl.Error as error:  # no room on the device, or a driver that refuses a shader
+            text = " ".join(str(error).split())
+            raise DeviceError(f"{self.device.renderer} failed: {text}; try --backend cpu") from error
+
+    def _send(self, columns: Singles, samples: int) -> list[moderngl.Texture]:
+        """Textures of as many patches each as the device takes, with their results."""
+        room = min(MOST_RESULTS, self._limit("GL_MAX_SHADER_STORAGE_BLOCK_SIZE", MOST_RESULTS))
+        step = max(min(room // (samples * MOST_LENGTH * 4), self._limit("GL_MAX_TEXTURE_SIZE", 1024)), 1)
+        parts = [columns[begin : begin + step] for begin in range(0, len(columns), step)]
+        return [self._texture(part.reshape(len(part), -1, 4)) for part in parts]
+
+    def _release(self, textures: list[moderngl.Texture]) -> None:
+        for texture in textures:
+            texture.release()
+
+    def _multiply(self, kind: Kind, table: Table, controls: list[moderngl.Texture]) -> Singles:
         if kind not in self._programs:
             self._programs[kind] = Program(self.device, kind)
         basis = self._table(table)
-        results = np.empty((len(columns), table.samples, kind.length), dtype=np.float32)
-        step = self._most_patches(results[:1].nbytes)
-        for begin in range(0, len(columns), step):
-            part = results[begin : begin + step]
-            controls = self._texture(columns[begin : begin + step].reshape(len(part), -1, 4))
+        patches = sum(texture.height for texture in controls)
+        results = np.empty((patches, table.samples, kind.length), dtype=np.float32)
+        begin = 0
+        for texture in controls:
+            part = results[begin : begin + texture.height]
+            begin += texture.height
             buffer = self._buffer(part.nbytes)
-            self._programs[kind].run(basis, controls, buffer, (*part.shape[:2], columns.shape[2] // 4))
+            self._programs[kind].run(basis, texture, buffer, (*part.shape[:2], texture.width // 3))
             buffer.read_into(part, part.nbytes)
-            controls.release()
         return results
-
-    def _most_patches(self, bytes_: int) -> int:
-        """Patches evaluated at once, of results of some ``bytes_`` each: as many as textures and buffers hold."""
-        limits = self.device.limits
-        room = min(MOST_RESULTS, _limit(limits, "GL_MAX_SHADER_STORAGE_BLOCK_SIZE", MOST_RESULTS))
-        return max(min(room // bytes_, _limit(limits, "GL_MAX_TEXTURE_SIZE", 1024)), 1)
 
     def _table(self, table: Table) -> moderngl.Texture:
         """The texture of a table, sent unless it is there; the oldest make room."""
@@ -130,13 +157,13 @@ class Products:
     def _texture(self, texels: Singles) -> moderngl.Texture:
         """A texture of ``texels (height, width, 4)``. Raises DeviceError where it is too large."""
         height, width = texels.shape[:2]
-        most = _limit(self.device.limits, "GL_MAX_TEXTURE_SIZE", 1024)
+        most = self._limit("GL_MAX_TEXTURE_SIZE", 1024)
         if max(height, width) > most:
             raise DeviceError(
                 f"{self.device.renderer} takes tables up to {most}, this patch needs {max(height, width)}; "
                 "try --backend cpu"
             )
-        self.sent += texels.nbytes
+        self.bytes_sent += texels.nbytes
         return self.device.ctx.texture((width, height), 4, np.ascontiguousarray(texels), dtype="f4")
 
     def _buffer(self, size: int) -> moderngl.Buffer:
@@ -147,10 +174,11 @@ class Products:
             self._results = self.device.ctx.buffer(reserve=size)
         return self._results
 
+    def _limit(self, name: str, unknown: int) -> int:
+        """A limit of the device."""
+        value = self.device.limits.get(name)
+        return value if isinstance(value, int) and value > 0 else unknown
+
 
 def _texture_bytes(texture: moderngl.Texture) -> int:
     return texture.width * texture.height * 16
-
-
-def _limit(limits: dict[str, Any], name: str, unknown: int) -> int:
-    return int(limits.get(name) or unknown)

@@ -35,6 +35,8 @@ NORMALS = Kind("NORMALS", 3, 6)
 VALUES = Kind("VALUES", 1, 3)
 #: Values made unit vectors, zero where they have no direction.
 UNIT = Kind("UNIT", 1, 3)
+#: The most numbers a sample that any of them makes.
+MOST_LENGTH = 6
 
 
 class Program:
