@@ -49,7 +49,7 @@ class Vectors:
         if points:
             origin = linear[..., 0].astype(np.float32).astype(np.float64)
             linear = np.concatenate([linear[..., :points] - origin[..., None], linear[..., points:]], axis=2)
-        fields = [] if nodes is None else [nodes.reshape(3, patches, -1)]
+        fields = [] if nodes is None else [nodes.reshape(3, patches, nodes.shape[2] * nodes.shape[3])]
         columns, scale = pack_columns(linear, *fields)
         return cls(columns, scale, origin.T)
 
@@ -173,6 +173,7 @@ class GpuBackend:
                 break
             controls = controls.take(np.flatnonzero(~enough))
         return np.isin(np.arange(len(rows)), left)
+
 
 def _enough_points(nodes: Floats) -> Bools:
     """Which patches ``(f,)`` have fields ``(3,f,n,m)`` at enough points; all of them where there are no fields."""

@@ -30,7 +30,6 @@ BAD = {
     "too many names": (["refine", "cube.obj", "a.ply", "b.ply"], "b.ply"),
     "alpha alone": (["refine", "cube.obj", "dense.ply", "--alpha", "2"], "--cross-tangent quadratic"),
     "alpha 0": (["refine", "cube.obj", "dense.ply", "--cross-tangent", "quadratic", "--alpha", "0"], "alpha"),
-    "gpu": (["refine", "cube.obj", "dense.ply", "--backend", "gpu"], "no GPU backend"),
     "ascii obj": (["refine", "cube.obj", "dense.obj", "--ascii"], "--ascii"),
     "report twice": (["refine", "cube.obj", "-", "--output-format", "ply", "--report", "-"], "standard output"),
     "report over IN": (["refine", "cube.obj", "dense.ply", "--report", "./cube.obj"], "same file"),
