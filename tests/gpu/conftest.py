@@ -1,36 +1,25 @@
-"""A device for the tests: they skip where there is none, unless CURVIFY_GPU_TESTS=required says that there must be."""
+"""The device and the backend that tests share."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 
 import pytest
 
-from curvify.errors import DeviceError
-from curvify.gpu.device import open_device
+from curvify.gpu.device import Device
 from curvify.gpu.evaluate import GpuBackend
-
-
-def opened_or_skipped(open_it):
-    """What a function opens; skips the test where there is no device, which may be forbidden."""
-    try:
-        return open_it()
-    except DeviceError as error:
-        if os.environ.get("CURVIFY_GPU_TESTS") == "required":
-            raise
-        pytest.skip(str(error))
+from opengl import device_or_skip, opened_or_skip
 
 
 @pytest.fixture
-def device():
+def device() -> Iterator[Device]:
     """An open device."""
-    with opened_or_skipped(open_device) as device:
+    with device_or_skip() as device:
         yield device
 
 
 @pytest.fixture(scope="session")
 def gpu() -> Iterator[GpuBackend]:
     """The GPU backend."""
-    with opened_or_skipped(GpuBackend) as backend:
+    with opened_or_skip(GpuBackend) as backend:
         yield backend
