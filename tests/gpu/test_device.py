@@ -91,6 +91,7 @@ def test_a_device_that_is_not_there_is_named(device, monkeypatch):
 
 
 def test_missing_libraries_are_named_with_what_to_install(monkeypatch):
+    monkeypatch.delenv("CURVIFY_GL", raising=False)
     for name, value in NO_LIBRARIES.items():
         monkeypatch.setenv(name, value)
     with pytest.raises(DeviceError) as caught:
@@ -102,6 +103,7 @@ def test_missing_libraries_are_named_with_what_to_install(monkeypatch):
 
 
 def test_a_missing_moderngl_is_named(monkeypatch):
+    monkeypatch.delenv("CURVIFY_GL", raising=False)
     monkeypatch.setitem(sys.modules, "moderngl", None)
     with pytest.raises(DeviceError, match="pip install moderngl"):
         open_device()
