@@ -11,170 +11,29 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import lru_cache, partial
+from collections.abc import Iterator
 
 import numpy as np
 
+from curvify import tables
 from curvify.arrays import unit_rows
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import unit
 from curvify.sampling import Sampling
 from curvify.schemes.base import Basis, Controls, Form, PatchClass, Patches, bernstein_basis
 from curvify.schemes.domain import domain_jets
+from curvify.tables import TAIL, Tables, chebyshev_points
 
-#: Numbers of Chebyshev points tried, fewest first.
-NODE_COUNTS = (12, 16, 24, 32, 48)
-#: Chebyshev coefficients at the end of the series from which the rest is estimated, and how much to make of that.
-TAIL, SAFETY = 4, 10.0
+#: How much to make of the estimate of what a series leaves out.
+SAFETY = 10.0
 #: Coefficients below this share of the longest vector are rounding noise.
 NOISE = 2e-15
-#: Samples of a patch evaluated with one table, so that the table stays in cache.
-SAMPLES = 2048
 #: From this many sides the fields are evaluated at every sample: the tables would be too large.
 MANY_SIDES = 17
 #: Squared sine below which two derivatives count as parallel.
 PARALLEL = 1e-20
 #: Up to this many samples a patch the fields are evaluated at every sample: that is less than at the points.
 FEW_SAMPLES = 9
-
-
-def chebyshev_points(count: int) -> Floats:
-    """Chebyshev-Lobatto points ``(m,)`` of [0, 1], ascending, ends included."""
-    return np.sin(0.5 * np.pi * np.arange(count) / (count - 1)) ** 2
-
-
-@lru_cache(maxsize=8)
-def _tail_matrix(count: int) -> Floats:
-    """Values at the Chebyshev points to the last coefficients of their series ``(m, TAIL)``."""
-    j = np.arange(count)
-    order = j[-TAIL:]
-    matrix = np.cos(np.pi * np.outer(count - 1 - j, order) / (count - 1)) * 2 / (count - 1)
-    matrix[[0, -1]] /= 2
-    matrix[:, order == count - 1] /= 2
-    return matrix
-
-
-def lagrange(count: int, t: Floats) -> tuple[Floats, Floats]:
-    """Lagrange polynomials at the Chebyshev points and their derivatives at ``t (...)``: ``(...,m)`` each."""
-    nodes = chebyshev_points(count)
-    sign = (-1.0) ** np.arange(count)
-    sign[[0, -1]] /= 2
-    gap = t[..., None] - nodes
-    at_node = np.abs(gap) < 1e-14
-    terms = sign / np.where(at_node, 1.0, gap)
-    values = terms / terms.sum(axis=-1, keepdims=True)
-    hit = at_node.any(axis=-1)
-    values[hit] = at_node[hit]
-    return values, values @ _differentiation(count)
-
-
-@lru_cache(maxsize=8)
-def _differentiation(count: int) -> Floats:
-    """Matrix ``(m,m)``: row i holds the derivatives at node i of the Lagrange polynomials."""
-    nodes = chebyshev_points(count)
-    sign = (-1.0) ** np.arange(count)
-    sign[[0, -1]] /= 2
-    gap = nodes[:, None] - nodes
-    np.fill_diagonal(gap, 1.0)
-    matrix = (sign / sign[:, None]) / gap
-    np.fill_diagonal(matrix, 0.0)
-    np.fill_diagonal(matrix, -matrix.sum(axis=1))
-    return matrix
-
-
-# --- tables -------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class Tables:
-    """Tables of one form at the samples ``first`` to ``last`` of a patch.
-
-    Either ``matrix (K, o*S)`` for control vectors followed by field values, o = 3 orders (value, by xi, by eta) or 1;
-    or, where the fields are to be evaluated at every sample, the ``basis`` itself.
-    """
-
-    first: int
-    last: int
-    matrix: Floats | None
-    basis: Basis | None
-
-    @property
-    def bytes(self) -> int:
-        """Memory it takes."""
-        if self.matrix is not None:
-            return self.matrix.nbytes
-        return self.basis.linear.nbytes + 4 * self.basis.weights.nbytes if self.basis is not None else 0
-
-
-class _TableCache:
-    """Tables up to a number of bytes in all.
-
-    When it is full, the tables of other surfaces make room, oldest first, never those of the same: every patch asks
-    for all blocks of its tables in turn, and dropping the oldest would drop each just before it is asked for.
-    """
-
-    def __init__(self, most: int) -> None:
-        self.most, self.size = most, 0
-        self.tables: dict[tuple[object, ...], Tables] = {}
-        self.lock = threading.Lock()
-
-    def get(self, key: tuple[object, ...], make: Callable[[], Tables]) -> Tables:
-        """The tables of a key, made if need be; two threads may make the same ones, which are equal."""
-        with self.lock:
-            found = self.tables.pop(key, None)
-            if found is not None:
-                self.tables[key] = found
-                return found
-        made = make()
-        size = made.bytes
-        with self.lock:
-            others = [old for old in self.tables if old[:-1] != key[:-1]]
-            while self.size + size > self.most and others:
-                self.size -= self.tables.pop(others.pop(0)).bytes
-            if key not in self.tables and self.size + size <= self.most:
-                self.tables[key] = made
-                self.size += size
-        return made
-
-
-_CACHE = _TableCache(160 << 20)
-
-
-def tables(form: Form, points: Floats, grid: tuple[int, int], count: int, orders: int) -> Iterator[Tables]:
-    """Tables of a form at all interior ``points (S,2)`` of a sampling, block by block.
-
-    ``grid`` (sides, level) names the sampling in the cache, ``count`` is the number of Chebyshev points.
-    """
-    for first in range(0, len(points), SAMPLES):
-        last = min(first + SAMPLES, len(points))
-        key = (form.key, grid, count, orders, first)
-        yield _CACHE.get(key, partial(_make_tables, form, points, first, last, count, orders))
-
-
-def _make_tables(form: Form, points: Floats, first: int, last: int, count: int, orders: int) -> Tables:
-    basis = form.basis(points[first:last])
-    if not count:
-        return Tables(first, last, None, basis)
-    samples, sides = basis.weights.shape[1:]
-    linear = basis.linear[:orders]
-    columns = linear.shape[2]
-    table = np.empty((columns + sides * count, orders, samples))
-    table[:columns] = linear.transpose(2, 0, 1)
-    if sides:
-        values, slopes = lagrange(count, basis.abscissae[0])
-        weights, u = basis.weights[:orders, :, :, None], basis.abscissae[:orders, :, :, None]
-        fields = np.empty((orders, samples, sides, count))
-        fields[0] = weights[0] * values
-        fields[1:] = weights[1:] * values + weights[0] * u[1:] * slopes
-        fields[..., 0] += basis.ends[:orders, ..., 0]
-        fields[..., -1] += basis.ends[:orders, ..., 1]
-        table[columns:] = fields.reshape(orders, samples, -1).transpose(2, 0, 1)
-    return Tables(first, last, np.ascontiguousarray(table.reshape(len(table), -1)), None)
-
-
-# --- patches ------------------------------------------------------------------------------------------------
 
 
 _LOCAL = threading.local()
@@ -203,7 +62,7 @@ def enough_points(fields: Floats, tolerance: float) -> Bools:
     when the last four are rounding noise.
     """
     patches, count = fields.shape[1], fields.shape[3]
-    last = np.abs(fields.reshape(-1, count) @ _tail_matrix(count)).reshape(3, patches, -1, TAIL).max(axis=0)
+    last = np.abs(fields.reshape(-1, count) @ tables.tail_matrix(count)).reshape(3, patches, -1, TAIL).max(axis=0)
     earlier, later = np.maximum(last[..., 0], last[..., 1]), np.maximum(last[..., 2], last[..., 3])
     rate = np.sqrt(np.divide(later, earlier, out=np.ones_like(later), where=earlier > later))
     left_out = SAFETY * later * rate / np.maximum(1 - rate, 1 / SAFETY)
@@ -283,7 +142,7 @@ def _evaluate_form(
     left = np.arange(len(rows))
     controls = form.controls(rows)
     exact = grid[0] >= MANY_SIDES or len(points) <= FEW_SAMPLES
-    for count in () if exact else NODE_COUNTS:
+    for count in () if exact else tables.NODE_COUNTS:
         nodes = controls.fields(chebyshev_points(count))
         enough = enough_points(nodes, tolerance)
         part = np.flatnonzero(enough)
@@ -293,11 +152,11 @@ def _evaluate_form(
             return
         rest = np.flatnonzero(~enough)
         left, controls = left[rest], controls.take(rest)
-    size = chunk_size(min(len(points), SAMPLES))
+    size = chunk_size(min(len(points), tables.SAMPLES))
     for begin in range(0, len(left), size):
         part = np.arange(begin, min(begin + size, len(left)))
         few = controls.take(part)
-        for block in tables(form, points, grid, 0, orders):
+        for block in tables.blocks(form, points, grid, 0, orders):
             assert block.basis is not None
             yield (left[part], slice(block.first, block.last)), exact_values(few, block.basis, orders)
 
@@ -309,8 +168,8 @@ def _by_tables(
     grid, count, orders = key
     if not len(part):
         return
-    size = chunk_size(min(len(points), SAMPLES))
-    for block in tables(form, points, grid, count, orders):
+    size = chunk_size(min(len(points), tables.SAMPLES))
+    for block in tables.blocks(form, points, grid, count, orders):
         for begin in range(0, len(part), size):
             chunk = part[begin : begin + size]
             yield (chunk, slice(block.first, block.last)), _chunk(linear, nodes, chunk, size, block, orders)
@@ -363,8 +222,8 @@ def evaluate_at(patches: Patches, ids: Ints, points: Floats) -> tuple[Floats, Fl
     result = np.empty((3, len(ids), 3))
     for patch_class in patches.classes:
         mine = np.flatnonzero(_rows_of(patch_class, ids) >= 0)
-        for begin in range(0, len(mine), SAMPLES):
-            part = mine[begin : begin + SAMPLES]
+        for begin in range(0, len(mine), tables.SAMPLES):
+            part = mine[begin : begin + tables.SAMPLES]
             rows = _rows_of(patch_class, ids[part])
             basis = patch_class.surface.basis(points[part])
             controls = patch_class.surface.controls(rows)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import curvify
-from curvify import evaluate
+from curvify import evaluate, tables
 from curvify.jobs import SERIES_TOLERANCE
 from curvify.mesh import PolygonMesh
 from curvify.weld import number_dense_mesh
@@ -49,14 +49,14 @@ def worst(surface: curvify.Surface, level: int, kind: str) -> tuple[float, float
 def counts_of(surface: curvify.Surface, level: int, dtype: type, monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The numbers of Chebyshev points that refining takes, table by table; 0 is the pointwise fallback."""
     counts = []
-    tables = evaluate.tables
+    blocks = tables.blocks
 
     def watched(form: object, points: object, grid: object, count: int, orders: int) -> object:
         counts.append(count)
-        return tables(form, points, grid, count, orders)  # type: ignore[arg-type]
+        return blocks(form, points, grid, count, orders)  # type: ignore[arg-type]
 
     with monkeypatch.context() as patched:
-        patched.setattr(evaluate, "tables", watched)
+        patched.setattr(tables, "blocks", watched)
         surface.refine(level, dtype, threads=1)
     return counts
 
@@ -136,11 +136,11 @@ def test_every_number_of_chebyshev_points_serves_some_patch(monkeypatch: pytest.
     assert {16, 24, 32} <= found
 
 
-@pytest.mark.parametrize("count", evaluate.NODE_COUNTS)
+@pytest.mark.parametrize("count", tables.NODE_COUNTS)
 def test_lagrange_polynomials_carry_polynomials_and_their_slopes(count: int) -> None:
-    nodes = evaluate.chebyshev_points(count)
+    nodes = tables.chebyshev_points(count)
     t = np.concatenate([np.linspace(0, 1, 23), nodes])
-    values, slopes = evaluate.lagrange(count, t)
+    values, slopes = tables.lagrange(count, t)
     for power in (0, 1, 2, 5, 7):
         assert np.abs(values @ nodes**power - t**power).max() < 1e-13
         assert np.abs(slopes @ nodes**power - power * t ** max(power - 1, 0)).max() < 1e-10
@@ -149,8 +149,8 @@ def test_lagrange_polynomials_carry_polynomials_and_their_slopes(count: int) -> 
 def test_more_than_one_block_of_samples_gives_the_same_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
     surface = curvify.surface(on_sphere(dodecahedron()))
     whole = surface.refine(12)
-    monkeypatch.setattr(evaluate, "SAMPLES", 100)
-    monkeypatch.setattr(evaluate, "_CACHE", evaluate._TableCache(1 << 24))
+    monkeypatch.setattr(tables, "SAMPLES", 100)
+    monkeypatch.setattr(tables, "_CACHE", tables._TableCache(1 << 24))
     parts = surface.refine(12)
     assert np.abs(whole.positions - parts.positions).max() < 1e-14
     assert np.array_equal(whole.faces, parts.faces)
