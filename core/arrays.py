@@ -29,16 +29,47 @@ def values_of(small: Ints) -> list[int]:
 
 def cross(a: Floats, b: Floats, axis: int = -1) -> Floats:
     """Cross products along an axis: ``numpy.cross`` for plain 3-vectors, in a third of its time."""
-    a, b = np.moveaxis(a, axis, 0), np.moveaxis(b, axis, 0)
-    result = np.empty((3, *np.broadcast_shapes(a.shape[1:], b.shape[1:])))
+    if axis:
+        a, b = np.moveaxis(a, axis, 0), np.moveaxis(b, axis, 0)
+    result = np.empty_like(a) if a.shape == b.shape else np.empty((3, *np.broadcast_shapes(a.shape[1:], b.shape[1:])))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         np.multiply(a[j], b[k], out=result[i])
         result[i] -= a[k] * b[j]
-    return np.moveaxis(result, 0, axis)
+    return np.moveaxis(result, 0, axis) if axis else result
 
 
 def unit_rows(vectors: Floats) -> Floats:
     """Vectors ``(3,...)`` along the leading axis scaled to length 1, zero where they have none."""
     length = np.sqrt(np.einsum("c...,c...->...", vectors, vectors))
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+
+
+def take_rows(rows: Floats, index: Ints) -> Floats:
+    """``rows[index]`` for ``rows (n,c)`` and indices ``(...)`` that are in range, in a quarter of its time."""
+    return np.take(rows, index, axis=0, mode="clip")
+
+
+def as_slice(rows: Ints) -> Ints | slice:
+    """Ascending rows as a slice where they follow each other: what is taken with it is not copied."""
+    together = len(rows) and rows[-1] - rows[0] == len(rows) - 1
+    return slice(int(rows[0]), int(rows[-1]) + 1) if together else rows
+
+
+def leading(vectors: Floats) -> Floats:
+    """Vectors ``(f,...,c)`` as ``(c,f,...)``, in memory the other way round: steps then run along the first axis, f."""
+    return np.asfortranarray(vectors).transpose(-1, *range(vectors.ndim - 1))
+
+
+def ahead(values: Floats) -> Floats:
+    """Values ``(...,n)`` around polygons, each replaced by the next one's."""
+    result = np.empty_like(values)
+    result[..., :-1], result[..., -1] = values[..., 1:], values[..., 0]
+    return result
+
+
+def behind(values: Floats) -> Floats:
+    """Values ``(...,n)`` around polygons, each replaced by the one before."""
+    result = np.empty_like(values)
+    result[..., 1:], result[..., 0] = values[..., :-1], values[..., -1]
+    return result

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from curvify import tables
-from curvify.arrays import unit_rows
+from curvify.arrays import as_slice, unit_rows
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import unit
 from curvify.sampling import Sampling
@@ -61,14 +61,15 @@ def enough_points(fields: Floats, tolerance: float) -> Bools:
     the sum of those left out. Enough when that is below ``tolerance`` times the longest of a patch's vectors, or
     when the last four are rounding noise.
     """
-    patches, count = fields.shape[1], fields.shape[3]
-    last = np.abs(fields.reshape(-1, count) @ tables.tail_matrix(count)).reshape(3, patches, -1, TAIL).max(axis=0)
-    earlier, later = np.maximum(last[..., 0], last[..., 1]), np.maximum(last[..., 2], last[..., 3])
+    rows = fields.transpose(3, 0, 2, 1)  # the order in memory
+    last = tables.tail_matrix(len(rows)).T @ rows.reshape(len(rows), -1)
+    last = np.abs(last, out=last).reshape(TAIL, *rows.shape[1:]).max(axis=1)
+    earlier, later = np.maximum(last[0], last[1]), np.maximum(last[2], last[3])
     rate = np.sqrt(np.divide(later, earlier, out=np.ones_like(later), where=earlier > later))
     left_out = SAFETY * later * rate / np.maximum(1 - rate, 1 / SAFETY)
-    size = np.abs(fields).reshape(3, patches, -1).max(axis=(0, 2))
-    noise = np.maximum(earlier, later).max(axis=1) <= NOISE * size
-    return noise | (left_out.max(axis=1) <= tolerance * size)
+    size = np.maximum(rows.max(axis=(0, 1, 2)), -rows.min(axis=(0, 1, 2)))
+    noise = np.maximum(earlier, later).max(axis=0) <= NOISE * size
+    return noise | (left_out.max(axis=0) <= tolerance * size)
 
 
 def fill_patches(
@@ -105,11 +106,9 @@ def fill_patches(
 
 def _store(out: Floats, place: tuple[Ints, slice], values: Floats) -> None:
     """Write ``values (3,f,S)`` to the patches and samples of ``place`` in ``out (F,S,3)``."""
-    rows, samples = place
-    together = len(rows) and rows[-1] - rows[0] == len(rows) - 1
-    part = slice(rows[0], rows[-1] + 1) if together else rows
+    rows, samples = as_slice(place[0]), place[1]
     for i in range(3):
-        out[part, samples, i] = values[i]
+        out[rows, samples, i] = values[i]
 
 
 def _cross_normals(a: Floats, b: Floats) -> tuple[Floats, tuple[Ints, Ints] | None]:
@@ -177,17 +176,19 @@ def _by_tables(
 
 def _chunk(linear: Floats, nodes: Floats, part: Ints, size: int, block: Tables, orders: int) -> Floats:
     """One matrix product for a chunk, padded by its last patch to a multiple of 16 patches."""
-    size = min(size, -(-len(part) // 16) * 16)
-    padded = np.concatenate([part, np.repeat(part[-1:], size - len(part))])
-    columns = linear.shape[2]
+    count = len(part)
+    size = min(size, -(-count // 16) * 16)
+    columns, (sides, points) = linear.shape[2], nodes.shape[2:]
     assert block.matrix is not None
     samples = block.last - block.first
     vectors = _work("vectors", (3, size, len(block.matrix)))
-    vectors[..., :columns] = linear[:, padded]
-    vectors[..., columns:] = nodes[:, padded].reshape(3, size, -1)
+    chosen = as_slice(part)
+    vectors[:, :count, :columns] = linear[:, chosen]
+    vectors[..., columns:].reshape(3, size, sides, points)[:, :count] = nodes[:, chosen]
+    vectors[:, count:] = vectors[:, count - 1 : count]
     product = _work("product", (3 * size, orders * samples))
     np.matmul(vectors.reshape(3 * size, -1), block.matrix, out=product)
-    return product.reshape(3, size, orders, samples)[:, : len(part)].transpose(2, 0, 1, 3)
+    return product.reshape(3, size, orders, samples)[:, :count].transpose(2, 0, 1, 3)
 
 
 def exact_values(controls: Controls, basis: Basis, orders: int = 3) -> Floats:
@@ -260,17 +261,21 @@ def blended_normals(patches: Patches, ids: Ints, points: Floats) -> Floats:
 
 def edge_points(curves: Floats, t: Floats) -> Floats:
     """Points ``(3,e,m)`` of Bezier curves ``(3,e,d+1)`` at ``t (m,)``, in plain elementwise arithmetic: an edge gets
-    the same bits wherever it stands.
+    the same bits wherever it stands. In memory the edges come last.
     """
-    basis = bernstein_basis(curves.shape[2] - 1, t)
-    total = curves[..., 0, None] * basis[0]
+    rows = np.ascontiguousarray(curves.transpose(2, 0, 1))
+    basis = bernstein_basis(len(rows) - 1, t)[:, :, None, None]
+    total = rows[0] * basis[0]
     term = np.empty_like(total)
-    for i in range(1, len(basis)):
-        np.multiply(curves[..., i, None], basis[i], out=term)
-        total += term
-    return total
+    for i in range(1, len(rows)):
+        total += np.multiply(rows[i], basis[i], out=term)
+    return total.transpose(1, 2, 0)
 
 
 def edge_normals(fields: Floats, t: Floats) -> Floats:
     """Unit normals ``(3,e,m)`` of Bezier normal fields ``(3,e,q+1)`` at ``t (m,)``."""
-    return unit_rows(edge_points(fields, t))
+    normals = edge_points(fields, t)
+    length = np.sqrt(np.einsum("cem,cem->em", normals, normals))
+    length[length == 0] = 1.0
+    normals /= length
+    return normals

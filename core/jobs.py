@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from curvify.arrays import as_slice
 from curvify.backends import Backend
 from curvify.errors import OptionError
 from curvify.mesh import Floats, Ints
@@ -24,7 +25,7 @@ from curvify.weld import Numbering, cells_of, corner_colors, repeat_vertices
 #: Samples in one job.
 WINDOW = 1 << 17
 #: Points of edges in one job: few, so that their work arrays stay in cache.
-EDGE_WINDOW = 1 << 14
+EDGE_WINDOW = 1 << 13
 #: Samples that a patch counts for at least.
 PATCH = 64
 #: What may be left out of the series of a cross tangent, over its length, by output type.
@@ -147,12 +148,14 @@ class _Evaluation:
         patches, numbering = self.patches, self.numbering
         t = numbering.abscissae
         records = self._records(len(edges) * len(t)).reshape(len(edges), len(t))
-        turn = np.flatnonzero(numbering.reversed[edges])
-        positions, normals = self.backend.edges(patches.curves[:, edges], patches.fields[:, fields], t)
+        turn = numbering.reversed[edges][:, None]
+        positions, normals = self.backend.edges(
+            patches.curves[:, as_slice(edges)], patches.fields[:, as_slice(fields)], t
+        )
         for name, values in (("position", positions), ("normal", normals)):
-            values[:, turn] = values[:, turn, ::-1]
+            along = np.where(turn, values[..., ::-1], values)
             for i in range(3):
-                records[name][..., i] = values[i]
+                records[name][..., i] = along[i]
         topology = patches.topology
         low = topology.vertices[half_edges] < topology.vertices[topology.next[half_edges]]
         first = np.where(low, half_edges, topology.next[half_edges])

@@ -14,15 +14,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from curvify.mesh import Bools, Floats, Ints
-from curvify.schemes.base import bernstein, bernstein_slope
+from curvify.schemes.base import bernstein, bernstein_basis, bernstein_slope, bernstein_slopes
 
 #: Weight of the smooth step in the blend of ``smooth``.
 SMOOTH_STEP = 0.75
+#: The smallest positive number.
+SMALLEST = 5e-324
 
 
 def dot(a: Floats, b: Floats) -> Floats:
     """Dot product over the leading axis."""
     return np.einsum("c...,c...->...", a, b)
+
+
+def _dots(a: Floats, b: Floats) -> Floats:
+    """Dot products ``(m,f,n)`` of vectors ``(m,3,f,n)``."""
+    return np.einsum("mcfn,mcfn->mfn", a, b)
 
 
 @dataclass(eq=False)
@@ -41,10 +48,35 @@ class Sides:
         return Sides(self.curves[:, rows], self.fields[:, rows], self.start[:, rows], self.end[:, rows])
 
 
-def projection(fields: Floats, y: Floats) -> Floats:
-    """Coefficient q of n_c in y, (n_c.y)/(n_c.n_c), zero where n_c vanishes."""
-    square = dot(fields, fields)
-    return np.divide(dot(fields, y), square, out=np.zeros_like(square), where=square > 0)
+def _abscissa_first(t: Floats) -> Floats:
+    """Abscissae ``(m,)``, ``(n,m)`` or ``(f,n,m)`` as ``(m,1,1)``, ``(m,1,n)`` or ``(m,f,n)``."""
+    first = t.transpose(t.ndim - 1, *range(t.ndim - 1))
+    return first.reshape(len(first), *([1] * (3 - t.ndim)), *first.shape[1:])
+
+
+def _abscissa_last(values: Floats) -> Floats:
+    """Vectors ``(m,3,f,n)`` as ``(3,f,n,m)``."""
+    return values.transpose(1, 2, 3, 0)
+
+
+def _polynomials(points: Floats, basis: Floats) -> Floats:
+    """Polynomials ``(m,3,f,n)`` with Bezier points ``(3,f,n,d+1)`` for a basis ``(d+1,m,1|f,1|n)``."""
+    if basis.shape[2:] == (1, 1):
+        rows = points.transpose(3, 0, 2, 1)
+        product = basis.reshape(len(basis), -1).T @ rows.reshape(len(basis), -1)
+        return product.reshape(-1, *rows.shape[1:]).swapaxes(2, 3)
+    total = points[..., 0] * basis[0][:, None]
+    for i in range(1, len(basis)):
+        total += points[..., i] * basis[i][:, None]
+    return total
+
+
+def projection(normal: Floats, y: Floats, square: Floats) -> Floats:
+    """Coefficient ``(m,f,n)`` of n_c in y: (n_c.y) / (n_c.n_c), where ``square`` is n_c.n_c.
+
+    Where the normal vanishes so does the product, and with it the quotient.
+    """
+    return _dots(normal, y) / np.maximum(square, SMALLEST)
 
 
 @dataclass(eq=False)
@@ -53,6 +85,7 @@ class ProjectedBlend:
 
     ``precise``: f = s_n, b = 4t(1-t), h = 1-t. ``smooth``: f = 1, b = 16 t^2 (1-t)^2, h a smoother step.
     ``gains (f,n)`` is K. The side field is T/f: f is the same for all faces, and stands in the basis.
+    Inside, the abscissa is the first axis, ``(m,3,f,n)``; in memory the faces are the last.
     """
 
     sides: Sides
@@ -65,31 +98,24 @@ class ProjectedBlend:
 
     def blend(self, t: Floats) -> Floats:
         """Y at ``t``: ``(3,f,n,m)``."""
-        h, _ = self._step(t)
-        normal = bernstein(self.sides.fields, t)
-        y = self.sides.start[..., None] * h
-        y += self.sides.end[..., None] * (1 - h)
-        y -= projection(normal, y) * normal
-        return y
-
-    def blend_with_slope(self, t: Floats) -> tuple[Floats, Floats]:
-        """Y and Y' at ``t``."""
-        h, h_slope = self._step(t)
-        start, end = self.sides.start[..., None], self.sides.end[..., None]
-        normal, normal_slope = bernstein(self.sides.fields, t), bernstein_slope(self.sides.fields, t)
-        return project_with_slope(start * h + end * (1 - h), (start - end) * h_slope, normal, normal_slope)
+        return _abscissa_last(self._blend(_abscissa_first(t)))
 
     def fields(self, t: Floats) -> Floats:
-        """T/f at ``t (m,)`` or ``(n,m)``: ``(3,f,n,m)``."""
-        y = self.blend(t)
-        y *= self._fullness(t)[0]
-        return y
+        """T/f at ``t (m,)``, ``(n,m)`` or ``(f,n,m)``: ``(3,f,n,m)``."""
+        t = _abscissa_first(t)
+        y = self._blend(t)
+        y *= self._fullness(t)[0][:, None]
+        return _abscissa_last(y)
 
     def field_derivatives(self, t: Floats) -> tuple[Floats, Floats]:
         """T/f and its derivative at ``t``."""
-        y, y_slope = self.blend_with_slope(t)
-        factor, slope = self._fullness(t)
-        return factor * y, slope * y + factor * y_slope
+        t = _abscissa_first(t)
+        y, y_slope = self._blend_with_slope(t)
+        factor, slope = (values[:, None] for values in self._fullness(t))
+        y_slope *= factor
+        y_slope += slope * y
+        y *= factor
+        return _abscissa_last(y), _abscissa_last(y_slope)
 
     def towards(self, direction: Floats, t: Floats) -> Floats:
         """Product ``(f,n,m)`` of T with vectors ``(3,f,n,m)`` across n_c, up to a positive factor.
@@ -102,6 +128,24 @@ class ProjectedBlend:
         start += np.einsum("cfnm,cfn->fnm", direction, self.sides.end) * (1 - h)
         return start
 
+    def _blend(self, t: Floats) -> Floats:
+        """Y ``(m,3,f,n)``."""
+        h = self._step(t)[0][:, None]
+        normal = _polynomials(self.sides.fields, bernstein_basis(3, t))
+        y = self.sides.start * h
+        y += self.sides.end * (1 - h)
+        normal *= projection(normal, y, _dots(normal, normal))[:, None]
+        y -= normal
+        return y
+
+    def _blend_with_slope(self, t: Floats) -> tuple[Floats, Floats]:
+        """Y and Y' ``(m,3,f,n)``."""
+        h, h_slope = (values[:, None] for values in self._step(t))
+        start, end = self.sides.start, self.sides.end
+        normal = _polynomials(self.sides.fields, bernstein_basis(3, t))
+        normal_slope = _polynomials(self.sides.fields, bernstein_slopes(3, t))
+        return project_with_slope(start * h + end * (1 - h), (start - end) * h_slope, normal, normal_slope)
+
     def _step(self, t: Floats) -> tuple[Floats, Floats]:
         """The share h of the start, and h'."""
         if self.kind == "precise":
@@ -110,20 +154,20 @@ class ProjectedBlend:
         return (1 - t) * ((1 - lam) + lam * (1 - t) * (1 + 2 * t)), -(1 - lam) - 6 * lam * t * (1 - t)
 
     def _fullness(self, t: Floats) -> tuple[Floats, Floats]:
-        """1 + K b and its derivative."""
+        """1 + K b and its derivative ``(m,f,n)``."""
         b, b_slope = 4 * t * (1 - t), 4 - 8 * t
-        gain = self.gains[..., None]
         if self.kind == "precise":
-            return 1 + gain * b, gain * b_slope
-        return 1 + gain * b**2, gain * 2 * b * b_slope
+            return 1 + self.gains * b, self.gains * b_slope
+        return 1 + self.gains * b**2, self.gains * (2 * b * b_slope)
 
 
 def project_with_slope(y: Floats, y_slope: Floats, normal: Floats, normal_slope: Floats) -> tuple[Floats, Floats]:
-    """The part of y across the normal, and its derivative."""
-    q = projection(normal, y)
-    square = dot(normal, normal)
-    numerator = dot(normal_slope, y) + dot(normal, y_slope) - 2 * q * dot(normal, normal_slope)
-    q_slope = np.divide(numerator, square, out=np.zeros_like(square), where=square > 0)
+    """The part ``(m,3,f,n)`` of y across the normal, and its derivative."""
+    square = _dots(normal, normal)
+    q = projection(normal, y, square)
+    numerator = _dots(normal_slope, y) + _dots(normal, y_slope) - 2 * q * _dots(normal, normal_slope)
+    q_slope = numerator / np.maximum(square, SMALLEST)
+    q, q_slope = q[:, None], q_slope[:, None]
     return y - q * normal, y_slope - q_slope * normal - q * normal_slope
 
 
@@ -211,7 +255,10 @@ class PaperTangent:
         ratio = np.sqrt(square / size)
         ratio_slope = ratio * (dot(x, x_slope) / square - dot(direction, slope) / size)
         first, last = (c[..., None] for c in self.corrections)
-        part, part_slope = project_with_slope((1 - t) * first + t * last, last - first, normal, normal_slope)
+        ends = (1 - t) * first + t * last, np.broadcast_to(last - first, x.shape), normal, normal_slope
+        part, part_slope = (
+            _abscissa_last(values) for values in project_with_slope(*(v.transpose(3, 0, 1, 2) for v in ends))
+        )
         value = ratio * direction + part
         value_slope = ratio * slope + ratio_slope * direction + part_slope
         if self.degenerate.any():

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from curvify.arrays import cross, unit_rows
+from curvify.arrays import ahead, behind, cross, unit_rows
 from curvify.errors import OptionError
 from curvify.mesh import Bools, Floats, Ints, PolygonMesh
 from curvify.options import MeshOptions
@@ -187,15 +187,15 @@ class GregoryControls:
         blocks = [points, *legs, slope[..., 0], slope[..., 2]]
         if corrected and n != 4:
             blocks.append(value[..., 1])
-        linear = np.zeros((3, len(corners), n * len(blocks) + corrected))
+        rows = np.zeros((n * len(blocks) + corrected, 3, len(corners)))
         for i, block in enumerate(blocks):
-            linear[..., n * i : n * (i + 1)] = block
+            rows[n * i : n * (i + 1)] = block.transpose(2, 0, 1)
         if target is not None:
             basis = center_row(n, uneven)
-            center = linear @ basis.linear[0, 0] + value[..., 1] @ basis.weights[0, 0]
+            center = np.tensordot(basis.linear[0, 0], rows, 1) + value[..., 1] @ basis.weights[0, 0]
             center += value[..., 0] @ basis.ends[0, 0, :, 0] + value[..., 2] @ basis.ends[0, 0, :, 1]
-            linear[..., -1] = target - center
-        return cls(linear, tangent)
+            rows[-1] = target - center
+        return cls(rows.transpose(1, 2, 0), tangent)
 
 
 def cross_tangents(
@@ -228,8 +228,8 @@ def patch_sides(work: Patchwork, corners: Ints) -> tuple[Floats, Sides]:
     """Corner points ``(3,f,n)`` and side data of patches."""
     points = work.corner_points(corners)
     curves, fields = work.side_curves(corners), work.side_fields(corners)
-    start = 3 * (np.roll(curves[..., 2], 1, axis=2) - points)
-    end = 3 * np.roll(curves[..., 1] - points, -1, axis=2)
+    start = 3 * (behind(curves[..., 2]) - points)
+    end = 3 * ahead(curves[..., 1] - points)
     return points, Sides(curves, fields, start, end)
 
 
@@ -240,9 +240,9 @@ def precise_tangent(sides: Sides, target: Floats) -> ProjectedBlend:
     share = {3: 0.0, 4: 0.15}.get(n, 0.3)
     if share == 0.0:
         return plain
-    half = np.array([0.5])
-    middle = plain.blend(half)[..., 0]
-    reach = target[..., None] - bernstein(sides.curves, half)[..., 0]
+    middle = plain.blend(np.array([0.5]))[..., 0]
+    p0, p1, p2, p3 = sides.curves.transpose(3, 0, 1, 2)
+    reach = target[..., None] - (p0 + 3 * (p1 + p2) + p3) / 8
     far, speed = np.sqrt(dot(reach, reach)), np.sqrt(dot(middle, middle))
     both = far * speed
     cosine = np.maximum(_quotient(dot(reach, middle), both), 0.5)
@@ -287,8 +287,7 @@ def center_point(points: Floats, normals: Floats, bulge: Floats) -> Floats:
     """
     middle = points.mean(axis=2)
     offsets = middle[..., None] - points
-    ahead = np.roll(offsets, -1, axis=2)
-    area = unit_rows(cross(offsets, ahead, axis=0).sum(axis=2))
+    area = unit_rows(cross(offsets, ahead(offsets), axis=0).sum(axis=2))
     total = normals.sum(axis=2)
     weak = np.sqrt(dot(total, total)) < 0.2 * points.shape[2]
     mean = np.where(weak, area, unit_rows(total))
@@ -325,6 +324,6 @@ class NormalControls:
 
 
 def _quotient(a: Floats, b: Floats) -> Floats:
-    """Quotient a / b, zero where b is zero."""
-    return np.divide(a, b, out=np.zeros(np.broadcast_shapes(a.shape, b.shape)), where=b != 0)
+    """Quotient a / b of arrays of one shape, zero where b is zero."""
+    return np.divide(a, b, out=np.zeros_like(b), where=b != 0)
 

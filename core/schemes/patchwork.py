@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from curvify.arrays import cross, values_of
+from curvify.arrays import cross, leading, take_rows, values_of
 from curvify.convex import Split, split_at_corners, split_polygons
 from curvify.edges import bending_normals, edge_curves, normal_fields, smooth_tangents
 from curvify.mesh import Bools, Floats, Ints
@@ -69,11 +69,11 @@ class Patchwork:
 
     def corner_points(self, corners: Ints) -> Floats:
         """Positions ``(3,f,n)`` of corners ``(f,n)``."""
-        return np.moveaxis(self.coarse.positions[self.topology.vertices[corners]], -1, 0)
+        return leading(take_rows(self.coarse.positions, self.topology.vertices[corners]))
 
     def corner_normals(self, corners: Ints) -> Floats:
         """Normals ``(3,f,n)`` of corners ``(f,n)``."""
-        return np.moveaxis(self.normals[corners], -1, 0)
+        return leading(take_rows(self.normals, corners))
 
     def side_curves(self, corners: Ints) -> Floats:
         """Bezier points ``(3,f,n,4)`` of the half-edges ``(f,n)``, each in its own direction."""
@@ -84,10 +84,14 @@ class Patchwork:
         return self._in_direction(self.fields, self.side_field[corners], corners)
 
     def _in_direction(self, points: Floats, rows: Ints, corners: Ints) -> Floats:
-        """The Bezier points ``(3,f,n,4)`` of some rows of ``points (3,N,4)``, turned where half-edges run backward."""
-        forward = self.topology.forward[corners][..., None]
-        order = np.arange(4)
-        return np.take(points.reshape(3, -1), 4 * rows[..., None] + np.where(forward, order, 3 - order), axis=1)
+        """The Bezier points ``(3,f,n,4)`` of some rows of ``points (3,N,4)``, turned where half-edges run backward.
+
+        In memory the faces come last.
+        """
+        stored = points.transpose(1, 2, 0).reshape(-1, 12)
+        found = leading(take_rows(stored, rows)).reshape(4, 3, *rows.shape)
+        forward = np.asfortranarray(self.topology.forward[corners])
+        return np.where(forward, found, found[::-1]).transpose(1, 2, 3, 0)
 
     def size_classes(self) -> Iterator[tuple[int, Ints]]:
         """Polygon sizes and the pieces ``(f,)`` of each."""
@@ -175,7 +179,7 @@ def _build(coarse: Coarse, features: Features, split: Split, lengths: str) -> Pa
     curves = edge_curves(start, end, tangents[:, 0], tangents[:, 1], lengths)
     side_field, edge, pair = _sides(topology, normals, ends)
     fields = normal_fields(curves[edge], pair[:, 0], pair[:, 1], bending[edge])
-    curves, fields = (np.ascontiguousarray(np.moveaxis(points, -1, 0)) for points in (curves, fields))
+    curves, fields = curves.transpose(2, 0, 1), fields.transpose(2, 0, 1)
     return Patchwork(coarse, features, split, topology, curves, fields, side_field, normals)
 
 
