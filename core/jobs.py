@@ -25,7 +25,7 @@ from curvify.weld import Numbering, cells_of, corner_colors, repeat_vertices
 #: Samples in one job.
 WINDOW = 1 << 17
 #: Points of edges in one job: few, so that their work arrays stay in cache.
-EDGE_WINDOW = 1 << 13
+EDGE_WINDOW = 1 << 14
 #: Samples that a patch counts for at least.
 PATCH = 64
 #: What may be left out of the series of a cross tangent, over its length, by output type.
