@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import sys
 import time
-from dataclasses import dataclass
 from typing import Any
 
 from curvify.cli.main import say
+from curvify.records import record
 from curvify.words import count_of
 
 #: Seconds of work before a progress bar appears.
 PATIENCE = 0.5
 
 
-@dataclass(frozen=True)
+@record
 class Console:
     """Speaks as much as the user wants to hear."""
 

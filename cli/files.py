@@ -7,7 +7,6 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any, BinaryIO, cast
 
 from curvify.errors import CurvifyError, FormatError, OptionError
@@ -56,9 +55,9 @@ def check_target(path: str, no_clobber: bool = False) -> None:
 
 def check_folder(path: str) -> None:
     """Raise FormatError where a file cannot be put."""
-    if Path(path).is_dir():
+    if os.path.isdir(path):
         raise FormatError(f"{path}: cannot write: it is a folder; give the name of a file")
-    if not Path(path).parent.is_dir():
+    if not os.path.isdir(os.path.dirname(path) or "."):
         raise FormatError(f"{path}: cannot write: its folder does not exist; make it first")
 
 

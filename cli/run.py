@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, field, fields
-from pathlib import Path
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from curvify.errors import FormatError, LimitError, MeshError, OptionError
 from curvify.formats.dense import dense_output
 from curvify.jobs import dense_layout
 from curvify.mesh import Marks, PolygonMesh
+from curvify.records import field, record
 from curvify.refinement import Surface, surface
 from curvify.schemes import load_scheme
 from curvify.sinks import DenseLayout
@@ -28,7 +29,7 @@ from curvify.weld import number_dense_mesh
 from curvify.words import count_of
 
 
-@dataclass(frozen=True)
+@record
 class Request:
     """What the command line asks for; None where the scheme's own default holds."""
 
@@ -81,7 +82,7 @@ class Request:
         return np.dtype(mesh.position_dtype if self.precision == "input" else self.precision)
 
 
-@dataclass
+@record
 class Run:
     """What is known of a run by the time of its report."""
 
@@ -183,7 +184,7 @@ def _check_report(request: Request, report: str) -> None:
     if report != files.STREAM:
         files.check_folder(report)
         for other, name in ((request.output, "OUT"), (request.input, "IN")):
-            if other != files.STREAM and Path(report).resolve() == Path(other).resolve():
+            if other != files.STREAM and os.path.realpath(report) == os.path.realpath(other):
                 raise OptionError(f"{report}: {name} and --report cannot be the same file")
 
 
@@ -279,8 +280,8 @@ def _write(run: Run, recorder: Recorder | None, console: Console, backend: Backe
         )
     if request.output == files.STREAM:
         run.bytes = stdout.count
-    elif Path(request.output).is_file():
-        run.bytes = Path(request.output).stat().st_size
+    elif os.path.isfile(request.output):
+        run.bytes = os.path.getsize(request.output)
     return layout
 
 

@@ -10,8 +10,6 @@ from the lexicographically smallest of its positions, so that the corner listed 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from curvify.arrays import values_of
@@ -19,6 +17,7 @@ from curvify.dissect import Cut, Group, cut_group, edge_keys, is_in
 from curvify.errors import OptionError
 from curvify.mesh import Bools, Floats, Ints
 from curvify.polygons import cross_rows, distinct, dot_rows, judge, lay_flat, link_darts, next_corners
+from curvify.records import record
 
 RULES = ("best", "closest")
 CONCAVE, KEYHOLE, MANY_SIDED, FOLDING, UNSPLIT, FOLDED, DOUBLED = 1, 2, 4, 8, 16, 32, 64
@@ -33,7 +32,7 @@ REASONS = {
 ROUNDS = 4  # how often faces whose diagonals meet are cut anew
 
 
-@dataclass(eq=False)
+@record
 class Split:
     """Convex pieces of the faces of a mesh; a face that needs nothing is one piece.
 

@@ -7,14 +7,13 @@ crease. Source of the kinds: Leung, Wang, Zhang, section 3 (docs/sharp-features.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from curvify.arrays import distinct
 from curvify.mesh import Bools, Floats, Ints, Marks, PolygonMesh
 from curvify.normals import SAME_NORMAL, degrees_between
 from curvify.options import MeshOptions
+from curvify.records import field, record
 from curvify.topology import Loops, Topology, corner_links
 from curvify.words import count_of
 
@@ -24,7 +23,7 @@ COPLANAR = 0.01
 OWN_SOURCES = ("tags", "normals", "groups", "angle")
 
 
-@dataclass(eq=False)
+@record
 class ResolvedMarks:
     """What all sources together say about a mesh of E edges, V vertices and F faces.
 

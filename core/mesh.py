@@ -9,16 +9,21 @@ those on a crease or a texture seam have one for each side.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from curvify.errors import MeshError
+from curvify.records import field, record, replaced
 
-Floats = NDArray[np.floating]
-Ints = NDArray[np.integer]
-Bools = NDArray[np.bool_]
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.floating]
+    Ints = NDArray[np.integer]
+    Bools = NDArray[np.bool_]
+else:  # numpy.typing takes a while to import
+    Floats = Ints = Bools = np.ndarray
 
 
 def _ints(*shape: int) -> Ints:
@@ -29,7 +34,7 @@ def _floats(*shape: int) -> Floats:
     return np.zeros(shape, dtype=np.float64)
 
 
-@dataclass(eq=False)
+@record
 class Marks:
     """Features and shape controls, by vertex and face ids of the mesh (0-based).
 
@@ -91,7 +96,7 @@ class Marks:
             raise MeshError("the alpha of a face must be a positive number")
 
 
-@dataclass(eq=False)
+@record
 class PolygonMesh:
     """A polygon mesh as files hold it.
 
@@ -166,7 +171,7 @@ class PolygonMesh:
 
     def with_(self, **changes: object) -> PolygonMesh:
         """A copy that differs in the named fields (arrays are shared)."""
-        return replace(self, **changes)  # type: ignore[arg-type]
+        return replaced(self, **changes)
 
     def validate(self) -> None:
         """Raise MeshError unless shapes agree, indices are in range and coordinates are finite."""
@@ -186,7 +191,7 @@ class PolygonMesh:
             raise MeshError("face_offsets must not decrease")
 
 
-@dataclass(eq=False)
+@record
 class DenseMesh:
     """A refined mesh, welded: every point of the surface is one vertex.
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from curvify.convex import Split, split_polygons
 from curvify.mesh import Ints, PolygonMesh
+from curvify.records import replaced
 from curvify.words import count_of
 
 #: More sides than this are split before a surface is built.
@@ -40,7 +40,7 @@ def pieces_of(mesh: PolygonMesh, split: Split) -> PolygonMesh:
         face_materials=carried(mesh.face_materials, faces),
         face_groups=carried(mesh.face_groups, faces),
         face_smoothing=carried(mesh.face_smoothing, faces),
-        marks=replace(
+        marks=replaced(
             mesh.marks,
             flat_faces=np.flatnonzero(np.isin(faces, mesh.marks.flat_faces)),
             hole_faces=np.flatnonzero(np.isin(faces, mesh.marks.hole_faces)),

@@ -6,7 +6,6 @@ met on the way.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -18,6 +17,7 @@ from curvify.mesh import Bools, Floats, Ints, Marks, PolygonMesh
 from curvify.normals import SAME_NORMAL, degrees_between, is_flat_shaded, unit
 from curvify.options import MeshOptions
 from curvify.polygons import newell_normals
+from curvify.records import field, record
 from curvify.sectors import Features, end_normals, label_sectors, resolve_features, sides_of_edges
 from curvify.topology import (
     Loops,
@@ -36,7 +36,7 @@ from curvify.words import count_of
 LARGEST_COORDINATE = 1e30
 
 
-@dataclass(eq=False)
+@record
 class Coarse:
     """A mesh ready for a scheme.
 
@@ -225,7 +225,7 @@ def _without_area(coarse: Coarse) -> Bools:
     return np.linalg.norm(coarse.area, axis=1) <= 1e-12 * longest
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class GivenNormals:
     """Unit ``normals (C,3)`` of the loops' corners, zero where the file has none; None where they say nothing."""
 

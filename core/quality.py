@@ -6,14 +6,13 @@ they share, so that a fold shows as an angle near 180 degrees.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from curvify import evaluate
 from curvify.arrays import cross, values_of
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import degrees_between
+from curvify.records import record
 from curvify.sampling import domain_corners
 from curvify.schemes.base import Patches
 from curvify.topology import is_closed, signed_volume
@@ -22,7 +21,7 @@ from curvify.topology import is_closed, signed_volume
 PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 
-@dataclass(eq=False)
+@record
 class EdgeAngles:
     """Continuity across interior edges: ``edges (e,)``, ``angles (e,m)`` in degrees between the faces' normals,
     ``gaps (e,m)`` the distance between the faces' positions, ``smooth (e,)`` whether the edge should be smooth.

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from curvify.backends import Backend, open_backend
 from curvify.errors import LimitError, OptionError
 from curvify.jobs import dense_jobs, dense_layout
 from curvify.mesh import DenseMesh, Floats, Ints, PolygonMesh
+from curvify.records import field, record, replaced
 from curvify.schemes import load_scheme
 from curvify.schemes.base import Patches
 from curvify.sinks import ArraySink, DenseLayout, Sink
@@ -29,7 +29,7 @@ from curvify.weld import cell_sources, number_dense_mesh, predict_faces
 MAX_FACES = 50_000_000
 
 
-@dataclass(eq=False)
+@record
 class Surface:
     """A surface over a polygon mesh, ready to be evaluated anywhere or refined.
 
@@ -76,7 +76,7 @@ class Surface:
         """The same surface with one normal for every vertex of its dense mesh, also on creases."""
         from curvify.shading import weld_normals
 
-        return replace(self, patches=weld_normals(self.patches))
+        return replaced(self, patches=weld_normals(self.patches))
 
     def face_count(self, level: int) -> int:
         """Faces of the dense mesh at a level."""

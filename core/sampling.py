@@ -8,15 +8,15 @@ points of one patch in this order. No basis values here: the same sampling serve
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from curvify.mesh import Floats, Ints
+from curvify.records import record
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Sampling:
     """The samples of one patch.
 

@@ -8,8 +8,6 @@ Source: Leung, Wang, Zhang, sections 2 and 3, on a general model of our own (doc
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from curvify.arrays import cross, distinct
@@ -17,6 +15,7 @@ from curvify.edges import ALONG, LEAST_ADVANCE, bending_normals, smooth_tangents
 from curvify.marks import ResolvedMarks
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import SAME_NORMAL, degrees_between, dot, perpendicular, sector_normals, sum_by, unit
+from curvify.records import record
 from curvify.topology import Topology, components, corner_links
 
 #: The largest turn of a line at a vertex where it still runs on smoothly (degrees).
@@ -30,7 +29,7 @@ ONE_LINE = 1e-14
 NO_TURN = 1e-7
 
 
-@dataclass(eq=False)
+@record
 class Features:
     """What the surface must do at vertices and edge ends.
 
@@ -142,7 +141,7 @@ def _starting_normals(
     return normals, computed
 
 
-@dataclass(eq=False)
+@record
 class StraightPlanes:
     """Sectors with straight edges: their normals must be perpendicular to those.
 

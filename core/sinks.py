@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
 from curvify.mesh import DenseMesh, Ints, PolygonMesh
+from curvify.records import record
 
 
-@dataclass(eq=False)
+@record
 class DenseLayout:
     """The shape of a dense mesh before it is evaluated.
 

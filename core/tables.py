@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import lru_cache, partial
 
 import numpy as np
 
 from curvify.mesh import Floats
+from curvify.records import record
 from curvify.schemes.base import Basis, Form
 
 #: Numbers of Chebyshev points tried, fewest first.
@@ -69,7 +69,7 @@ def _differentiation(count: int) -> Floats:
     return matrix
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Tables:
     """Tables of one form at the samples ``first`` to ``last`` of a patch.
 

@@ -6,19 +6,18 @@ sorting, never by a walk, so that a million corners cost a handful of numpy call
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from curvify.arrays import distinct
 from curvify.mesh import Bools, Floats, Ints
 from curvify.polygons import newell_normals, next_corners, previous_corners
+from curvify.records import record
 
 #: Squared length below which an edge has none: what is divided by it would overflow.
 NO_LENGTH = 1e-280
 
 
-@dataclass(eq=False)
+@record
 class Loops:
     """Face loops on welded vertices, fit for building a surface.
 
@@ -32,7 +31,7 @@ class Loops:
     source_faces: Ints
 
 
-@dataclass(eq=False)
+@record
 class Topology:
     """Edges and neighbors of face loops.
 

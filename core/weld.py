@@ -9,18 +9,18 @@ patches). Wedges repeat vertices whose normal or texture coordinate differs betw
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from curvify.arrays import values_of
 from curvify.mesh import Bools, Floats, Ints
+from curvify.records import record
 from curvify.sampling import Sampling, edge_abscissae, segments
 from curvify.schemes.base import Patches
 from curvify.sectors import sides_of_edges
 
 
-@dataclass(eq=False)
+@record
 class Repeats:
     """Wedges beyond the vertices: ``corners (a,)`` are patch corners that show a repeated input vertex, then come
     ``half_edges (b,)`` that show a repeated edge, each ``inner`` wedges, those of one edge interleaved point by
@@ -33,7 +33,7 @@ class Repeats:
     strides: Ints
 
 
-@dataclass(eq=False)
+@record
 class Numbering:
     """Where everything goes. ``P`` vertices and ``R`` repeats.
 

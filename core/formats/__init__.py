@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from curvify.errors import FormatError
@@ -32,15 +31,16 @@ READ_FORMATS = (*_OWN, *_READABLE)
 WRITE_FORMATS = (*_OWN, *_WRITABLE)
 
 
-def _module(format: str) -> Any:
-    """The module of a format, imported when it is first needed: a run uses one or two of them."""
-    return import_module(f"curvify.formats.{format if format in _OWN else 'others'}")
+def _module(format: str, direction: str) -> Any:
+    """The module that reads or writes a format, imported when it is first needed: a run uses one or two of them."""
+    name = f"{format}_{direction}" if format in ("obj", "ply") else format if format in _OWN else "others"
+    return import_module(f"curvify.formats.{name}")
 
 
 def find_format(path: str | os.PathLike[str], format: str | None, known: tuple[str, ...]) -> str:
     """The format that ``format`` names, or the suffix of ``path``; raises FormatError unless it is known."""
     name = os.fspath(path)
-    chosen = (format if format is not None else Path(name).suffix).lower().removeprefix(".")
+    chosen = (format if format is not None else os.path.splitext(name.rstrip("/"))[1]).lower().removeprefix(".")
     if chosen in known:
         return chosen
     listed = ", ".join(known)
@@ -71,7 +71,7 @@ def read_mesh(
         except OSError as error:
             raise FormatError(f"stdin: cannot read: {error.strerror}") from None
         chosen = find_format("-", format or _sniff(data), READ_FORMATS)
-    module = _module(chosen)
+    module = _module(chosen, "read")
     mesh: PolygonMesh = (
         getattr(module, f"read_{chosen}")(data, name) if chosen in _OWN else module.read_other(data, name, chosen)
     )
@@ -115,7 +115,7 @@ def write_stream(
     mesh: PolygonMesh, out: BinaryIO, format: str, ascii: bool = False, dtype: FloatType | None = None
 ) -> None:
     """Write a mesh to an open file; see ``write_mesh``."""
-    module = _module(format)
+    module = _module(format, "write")
     if format == "ply":
         module.write_ply(mesh, out, ascii, dtype)
     elif format in _OWN:

@@ -8,12 +8,11 @@ import re
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from typing import BinaryIO
 
 from curvify.errors import FormatError
 
-_OWN_STREAM = re.compile(r"/dev/(?:stdin|stdout|stderr|fd/\d+)\Z|/proc/self/fd/\d+\Z")
+_OWN_STREAM = r"/dev/(?:stdin|stdout|stderr|fd/\d+)\Z|/proc/self/fd/\d+\Z"
 _NAMED_STREAMS = {"stdin": 0, "stdout": 1, "stderr": 2}
 _NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
 
@@ -34,7 +33,8 @@ def _explain(path: str, verb: str, error: OSError) -> FormatError:
 def read_bytes(path: str) -> bytes:
     """The whole content of a file. Raises FormatError where it cannot be read."""
     try:
-        return Path(path).read_bytes()
+        with open(path, "rb", buffering=0) as file:
+            return file.readall()
     except ValueError:  # an embedded null character
         raise FormatError(f"{path!r}: cannot read: that is not a file name") from None
     except OSError as error:
@@ -68,11 +68,11 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         with opened:
             yield opened
         if temporary and target:
-            temporary.replace(target)
+            os.replace(temporary, target)
     except BaseException as error:
         if temporary:
             with suppress(OSError):
-                temporary.unlink()
+                os.unlink(temporary)
         if isinstance(error, OSError) and error.errno in _NO_ROOM:
             raise _explain(name, "write", error) from None
         raise
@@ -80,13 +80,13 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 
 def _open_stream(name: str) -> BinaryIO | None:
     """The target itself where it is not a regular file, None where it is or will be one."""
-    full = str(Path.cwd() / name) if name else name
-    if _OWN_STREAM.match(full):
+    full = os.path.join(os.getcwd(), name) if name else name
+    if re.match(_OWN_STREAM, full):
         last = full.rsplit("/", 1)[1]
         # A duplicate keeps the stream's place: opening the name again would start over at 0.
         return os.fdopen(os.dup(_NAMED_STREAMS[last] if last in _NAMED_STREAMS else int(last)), "wb")
     try:
-        mode = Path(name).stat().st_mode
+        mode = os.stat(name).st_mode
     except FileNotFoundError:
         return None
     if stat.S_ISDIR(mode):
@@ -95,18 +95,18 @@ def _open_stream(name: str) -> BinaryIO | None:
         if not os.access(name, os.W_OK):
             raise PermissionError(errno.EACCES, "permission denied", name)
         return None
-    return Path(name).open("wb")
+    return open(name, "wb")
 
 
-def _open_beside(name: str) -> tuple[BinaryIO, Path, Path]:
+def _open_beside(name: str) -> tuple[BinaryIO, str, str]:
     """A new temporary file in the folder of the target: file, its path, the target's path."""
     if not name or name.endswith("/"):
         raise IsADirectoryError(errno.EISDIR, "is a directory", name)
-    target = Path(os.path.realpath(name))
-    temporary = target.parent / f".curvify-{os.urandom(6).hex()}.part"
+    target = os.path.realpath(name)
+    temporary = os.path.join(os.path.dirname(target), f".curvify-{os.urandom(6).hex()}.part")
     descriptor = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     with suppress(OSError):
-        temporary.chmod(stat.S_IMODE(target.stat().st_mode))
+        os.chmod(temporary, stat.S_IMODE(os.stat(target).st_mode))
     return os.fdopen(descriptor, "w+b"), temporary, target
 
 

@@ -7,25 +7,25 @@ none. Numbers count from 1, or back from the last element read before the line i
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 import numpy as np
 
 from curvify.errors import FormatError
 from curvify.formats.scan import BLANK, Bytes, Lines, parse_all, quote
 from curvify.mesh import Bools, Ints
+from curvify.records import record
 
 ABSENT = int(np.iinfo(np.int64).min)
 _KINDS = ("vertex", "texture coordinate", "normal")
 _PLURALS = ("vertices", "texture coordinates", "normals")
-_CORNER = re.compile(rb"[+-]?\d+(/([+-]?\d+)?){0,2}\Z")
+_CORNER = rb"[+-]?\d+(/([+-]?\d+)?){0,2}\Z"
 _SLASH = 47
 
 _FACE_BYTES: Bools = BLANK.copy()
 _FACE_BYTES[list(b"0123456789+-/")] = True
 
 
-@dataclass
+@record
 class FaceCorners:
     """``sizes (n,)`` corners on each line; ``refs (3, C)`` vertex, uv and normal, from 0, -1 for none."""
 
@@ -96,7 +96,7 @@ def _first_bad_corner(lines: Lines, chosen: Ints) -> FormatError:
     """The error for the first corner that has none of the four forms."""
     for line in chosen.tolist():
         for token in lines.get(line).split():
-            if not _CORNER.match(token):
+            if not re.match(_CORNER, token):
                 return lines.error(
                     line, f"{quote(token)} is not a corner of a face; write v, v/vt, v//vn or v/vt/vn"
                 )

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from curvify.formats.obj_faces import FaceCorners, read_faces
 from curvify.formats.obj_tags import TagError, Tags, check_ranges, to_marks
 from curvify.formats.scan import BLANK, Lines, check_rows, parse_rows, quote, split_lines, take_columns
 from curvify.mesh import Floats, Ints, PolygonMesh
+from curvify.records import field, record
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _EMPTY, _VERTEX, _UV, _NORMAL, _FACE, _SKIPPED, _OTHER = range(7)
-_COMMENT_IN_NAME = re.compile(rb"[ \t]#.*", re.DOTALL)
+_COMMENT_IN_NAME = rb"(?s)[ \t]#.*"
 _SMOOTHING_LIMIT = 2**62
 
 
-@dataclass
+@record
 class _States:
     """The values that one kind of state line took, and the lines from which each holds."""
 
@@ -31,7 +34,7 @@ class _States:
         return values[np.searchsorted(np.array(self.lines, dtype=np.int64), face_lines, side="right")]
 
 
-@dataclass
+@record
 class _Context:
     """Everything that the lines other than v, vt, vn and f say."""
 
@@ -162,7 +165,7 @@ def _read_context(lines: Lines, chosen: Ints) -> _Context:
     context = _Context()
     for line in chosen.tolist():
         keyword, _, rest = lines.get(line).replace(b"\t", b" ").partition(b" ")
-        rest = _COMMENT_IN_NAME.sub(b"", b" " + rest).strip()
+        rest = re.sub(_COMMENT_IN_NAME, b"", b" " + rest).strip()
         if keyword == b"t":
             try:
                 context.tags.add(rest.split(), line)

@@ -14,13 +14,13 @@ Indices count from 0, sharpness runs from 0 to 10 (and becomes 0..1 by value/10,
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
 from curvify.formats.scan import quote
 from curvify.mesh import Bools, Ints, Marks
+from curvify.records import field, record
 
 TAG_SCALE = 10.0
 
@@ -29,7 +29,7 @@ class TagError(ValueError):
     """A tag that cannot be understood; the text says why."""
 
 
-@dataclass
+@record
 class Tags:
     """Tags as they stand in a file: items with the line each came from."""
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from curvify.errors import FormatError
 from curvify.formats.files import clean_name
@@ -14,6 +13,9 @@ from curvify.formats.obj_tags import tag_lines
 from curvify.formats.text import blocks, corner_tokens, join_columns, vector_lines
 from curvify.formats.wedges import unique_rows
 from curvify.mesh import Floats, Ints, PolygonMesh
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 FloatType = type[np.float32] | type[np.float64] | np.dtype[np.floating]
 _FACE_BLOCK = 16384

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from curvify.errors import FormatError
 from curvify.formats.obj_write import FloatType, round_to
@@ -14,6 +13,9 @@ from curvify.formats.scan import Lines, check_rows, parse_rows, split_lines, spr
 from curvify.formats.text import join_columns, polygon_lines
 from curvify.formats.wedges import split_vertices, wedge_rows
 from curvify.mesh import Floats, Ints, PolygonMesh
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _HEADER = re.compile(rb"(ST)?(C)?(N)?(4)?OFF(?!\w)", re.IGNORECASE)
 _COUNTS = re.compile(rb"\s*(\d{1,18})\s+(\d{1,18})(\s+\d{1,18})?\s*\Z")

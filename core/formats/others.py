@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import logging
-from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -14,9 +13,10 @@ from curvify.errors import FormatError
 from curvify.formats.obj_write import round_to
 from curvify.formats.wedges import split_vertices, wedge_rows
 from curvify.mesh import Floats, Ints, PolygonMesh
+from curvify.records import record
 
 
-@dataclass
+@record
 class _Part:
     """One triangle mesh of a scene, in its place: ``faces (F,3)``, the others one row for each vertex."""
 

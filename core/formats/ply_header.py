@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from curvify.errors import FormatError
 from curvify.formats.scan import quote
+from curvify.records import field, record
 
 Order = Literal["<", ">", "="]
 _TYPES = {
@@ -24,7 +24,7 @@ _NEWLINE = re.compile(rb"\r\n|\n|\r")
 _MAX_HEADER = 1 << 24
 
 
-@dataclass
+@record
 class Property:
     """A value of each row, or a list of values where ``count_type`` is given."""
 
@@ -33,7 +33,7 @@ class Property:
     count_type: np.dtype[np.generic] | None = None
 
 
-@dataclass
+@record
 class Element:
     """``count`` rows of properties, announced on header line ``line``."""
 
@@ -51,7 +51,7 @@ class Element:
         return next(p.type for p in self.properties if p.name == name).newbyteorder("=")
 
 
-@dataclass
+@record
 class Header:
     """``order`` is ``<`` or ``>`` for binary files and ``=`` for ascii; the body starts at byte ``body``."""
 

@@ -10,16 +10,19 @@ Beyond the usual properties, curvify reads (and writes) its marks and attributes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from curvify.errors import FormatError
 from curvify.formats.ply_header import Header, read_header
 from curvify.formats.ply_tables import Table, read_tables
 from curvify.formats.scan import spread
 from curvify.mesh import Bools, Floats, Ints, Marks, PolygonMesh
+from curvify.records import record
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _INDEX_NAMES = ("vertex_indices", "vertex_index")
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
@@ -63,7 +66,7 @@ def read_ply(data: bytes, name: str) -> PolygonMesh:
     )
 
 
-@dataclass
+@record
 class _Faces:
     """``sizes (F,)``, ``vertices (C,)``; the face table, if any, and which of its rows were ``kept (n,)``."""
 

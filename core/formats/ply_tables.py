@@ -10,22 +10,25 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import islice
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from curvify.errors import FormatError
 from curvify.formats.ply_header import Element, Header
 from curvify.formats.scan import count_tokens, parse_all, quote, spread, unify_newlines
 from curvify.mesh import Floats, Ints
+from curvify.records import record
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _DOUBLE = np.dtype(np.float64)
-_TOKEN = re.compile(rb"\S+")
+_TOKEN = rb"\S+"
 
 
-@dataclass
+@record
 class Body:
     """``blob`` holds the rows from ``start`` on; ``source`` is the ascii text it was made from, if any."""
 
@@ -39,7 +42,7 @@ class Body:
         """An error that points at the line (ascii) or byte (binary) of ``offset`` in the blob."""
         if self.source is None:
             return FormatError(f"{self.name}: byte {offset}: {message}")
-        token = next(islice(_TOKEN.finditer(self.source), offset // _DOUBLE.itemsize, None), None)
+        token = next(islice(re.finditer(_TOKEN, self.source), offset // _DOUBLE.itemsize, None), None)
         at = len(self.source.rstrip()) if token is None else token.start()
         number = self.source.count(b"\n", 0, at) + self.header.line_count + 1
         return FormatError(f"{self.name}:{number}: {message}")
@@ -49,7 +52,7 @@ class Body:
         return declared.newbyteorder(self.header.order or "=") if self.source is None else _DOUBLE
 
 
-@dataclass
+@record
 class _Slot:
     """Where a property lies: ``offset`` bytes behind anchor ``anchor`` (0: row start, j: end of list j-1)."""
 
@@ -59,7 +62,7 @@ class _Slot:
     count_type: np.dtype[np.generic] | None
 
 
-@dataclass
+@record
 class Table:
     """The rows of one element, from ``begin`` to ``end``.
 

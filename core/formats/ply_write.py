@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from curvify.formats.files import clean_name
 from curvify.formats.obj_write import FloatType, round_to
 from curvify.formats.text import join_columns, polygon_lines
 from curvify.formats.wedges import Wedges, split_vertices, wedge_rows
 from curvify.mesh import Bools, Floats, Ints, PolygonMesh
+from curvify.records import record
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _TYPE_NAMES = {
     "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort",
@@ -22,7 +24,7 @@ _COLOR_NAMES = ("red", "green", "blue", "alpha")
 _BLOCK = 65536
 
 
-@dataclass
+@record
 class _Group:
     """Scalar properties of one type side by side: ``values (n,k)`` with k names."""
 

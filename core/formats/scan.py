@@ -8,19 +8,24 @@ from __future__ import annotations
 
 import re
 import warnings
-from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from curvify.errors import FormatError
 from curvify.mesh import Bools, Floats, Ints
+from curvify.records import record
 
-Bytes = NDArray[np.uint8]
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Bytes = NDArray[np.uint8]
+else:
+    Bytes = np.ndarray
 
 BLANK: Bools = np.zeros(256, dtype=np.bool_)
 BLANK[list(b" \t\n\v\f\r")] = True
-_NUMBER = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z|[+-]?(nan|inf|infinity)\Z", re.IGNORECASE)
+_NUMBER = rb"(?i)[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\Z|[+-]?(nan|inf|infinity)\Z"
 _MAX_INDENT_STEPS = 64
 
 
@@ -69,7 +74,7 @@ def spread(starts: Ints, counts: Ints) -> Ints:
     return indices
 
 
-@dataclass
+@record
 class Lines:
     """A text file cut into lines.
 
@@ -165,7 +170,7 @@ def _parse_line(lines: Lines, line: int) -> list[float]:
     """The numbers of one line; raises FormatError at a token that is none."""
     tokens = lines.get(line).split()
     for token in tokens:
-        if not _NUMBER.match(token):
+        if not re.match(_NUMBER, token):
             raise lines.error(line, f"{quote(token)} is not a number; correct the line")
     return [float(token) for token in tokens]
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from curvify.mesh import Floats, Ints, PolygonMesh
+from curvify.records import record
 
 
 def unique_rows(rows: Floats) -> tuple[Ints, Ints]:
@@ -33,7 +32,7 @@ def first_appearance(key: Ints) -> tuple[Ints, Ints]:
     return first[order], rank[which]
 
 
-@dataclass
+@record
 class Wedges:
     """Vertices repeated for their further normals and uvs.
 

@@ -11,18 +11,18 @@ fields. A backend multiplies tables and control vectors; it needs to know nothin
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, field
 from math import comb
 from typing import Any, Protocol
 
 import numpy as np
 
 from curvify.mesh import Floats, Ints, PolygonMesh
+from curvify.records import field, record
 from curvify.sampling import Sampling
 from curvify.topology import Topology
 
 
-@dataclass(eq=False)
+@record
 class Basis:
     """A basis at ``S`` points of a domain; leading axis: value, derivative by xi, derivative by eta.
 
@@ -54,7 +54,7 @@ class Controls(Protocol):
         """Side fields and their derivatives, each ``(3,f,n,m)``, at ``t`` as above."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Form:
     """A vector function on the faces of one class.
 
@@ -70,7 +70,7 @@ class Form:
     points: int = 0
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PatchClass:
     """Patches that share their tables: ``patches (f,)`` ids, ascending, all with ``sides`` sides.
 
@@ -83,7 +83,7 @@ class PatchClass:
     normals: Form | None = None
 
 
-@dataclass(eq=False)
+@record
 class Patches:
     """A mesh's surface, ready to evaluate.
 

@@ -9,11 +9,10 @@ Arrays run (component, face, side, abscissa).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from curvify.mesh import Bools, Floats, Ints
+from curvify.records import record
 from curvify.schemes.base import bernstein, bernstein_basis, bernstein_slope, bernstein_slopes
 
 #: Weight of the smooth step in the blend of ``smooth``.
@@ -32,7 +31,7 @@ def _dots(a: Floats, b: Floats) -> Floats:
     return np.einsum("mcfn,mcfn->mfn", a, b)
 
 
-@dataclass(eq=False)
+@record
 class Sides:
     """Side data of some faces: ``curves`` and ``fields (3,f,n,4)`` Bezier points along each side in the face's
     direction; ``start``, ``end (3,f,n)`` the cross tangents that the neighboring edges ask for at its ends.
@@ -79,7 +78,7 @@ def projection(normal: Floats, y: Floats, square: Floats) -> Floats:
     return _dots(normal, y) / np.maximum(square, SMALLEST)
 
 
-@dataclass(eq=False)
+@record
 class ProjectedBlend:
     """T = f(t) (1 + K b(t)) Y, Y the part across n_c of h(t) T(0) + (1 - h(t)) T(1).
 
@@ -171,7 +170,7 @@ def project_with_slope(y: Floats, y_slope: Floats, normal: Floats, normal_slope:
     return y - q * normal, y_slope - q_slope * normal - q * normal_slope
 
 
-@dataclass(eq=False)
+@record
 class PaperTangent:
     """The paper's cross tangent: the polygon's chord across the side, turned to be perpendicular to n_c.
 

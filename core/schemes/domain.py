@@ -6,11 +6,10 @@ array whose leading axis holds value, derivative by xi, derivative by eta.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from curvify.mesh import Floats
+from curvify.records import record
 from curvify.sampling import domain_corners
 
 
@@ -32,7 +31,7 @@ def apothem(sides: int) -> float:
     return 0.5 / np.tan(np.pi / sides)
 
 
-@dataclass(eq=False)
+@record
 class Domain:
     """Jets ``(3,n,S)`` at S points: ``u[k]``, ``v[k]`` of corner k and its weight ``w[k]``; ``distance[k]`` to
     side k, in units of the apothem.

@@ -17,6 +17,7 @@ from curvify.errors import OptionError
 from curvify.mesh import Bools, Floats, Ints, PolygonMesh
 from curvify.options import MeshOptions
 from curvify.prepare import prepare_mesh
+from curvify.records import record
 from curvify.sampling import kite_sampling
 from curvify.schemes.base import Basis, Form, PatchClass, Patches, bernstein
 from curvify.schemes.cross_tangents import PaperTangent, ProjectedBlend, Sides, dot
@@ -107,7 +108,7 @@ def is_uneven(points: Floats) -> Bools:
     return lengths.max(axis=1) > LARGE_SHARE * lengths.sum(axis=1)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FaceShapes:
     """How far each patch swells: ``bulge (P,)`` and ``alpha (P,)``."""
 
@@ -151,7 +152,7 @@ def _surface_basis(sides: int, corrected: bool, uneven: bool, points: Floats) ->
 CrossTangent = ProjectedBlend | PaperTangent
 
 
-@dataclass(eq=False)
+@record
 class GregoryControls:
     """Control vectors ``linear (3,f,L)`` of some patches, and their cross tangents."""
 
@@ -299,7 +300,7 @@ def center_point(points: Floats, normals: Floats, bulge: Floats) -> Floats:
     return middle + axis * height
 
 
-@dataclass(eq=False)
+@record
 class NormalControls:
     """Controls of the paper's approximate normals: corner normals and unit edge normals."""
 

@@ -7,7 +7,6 @@ where the patch would fold (Leung, Wang, Zhang, section 2.3; the fold tests are 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -19,6 +18,7 @@ from curvify.mesh import Bools, Floats, Ints
 from curvify.pieces import MAX_SIDES, split_notes
 from curvify.polygons import newell_normals
 from curvify.prepare import Coarse
+from curvify.records import field, record
 from curvify.sampling import Sampling
 from curvify.schemes.base import PatchClass, Patches, bernstein, bernstein_slope
 from curvify.schemes.cross_tangents import Sides
@@ -47,7 +47,7 @@ class Inward(Protocol):
         """
 
 
-@dataclass(eq=False)
+@record
 class Patchwork:
     """Pieces of faces with their curves and normals.
 

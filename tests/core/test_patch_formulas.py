@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import pytest
 
 import curvify
 from curvify import evaluate
+from curvify.records import replaced
 from curvify.schemes.gregory import center_point
 from curvify.schemes.gregory_basis import gregory_basis
 from oracle import Patch
@@ -68,7 +68,7 @@ def test_precise_without_its_corrections_follows_the_equations(sides: int) -> No
     places = some_points(sides, seed=1)
     basis = gregory_basis(sides, places, corrected=False)
     basis.weights = gregory_basis(sides, places, corrected=True).weights  # with s_n, which the fields are without
-    plain = replace(controls, linear=controls.linear[:, :, : basis.linear.shape[2]])
+    plain = replaced(controls, linear=controls.linear[:, :, : basis.linear.shape[2]])
     got = evaluate.exact_values(plain, basis)[:, :, 0].transpose(0, 2, 1)
     for i, place in enumerate(places):
         assert np.abs(got[:, i] - oracle.jet(place, corrected=False)).max() < 2e-12

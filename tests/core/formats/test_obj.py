@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from curvify.errors import FormatError
-from curvify.formats.obj import read_obj, write_obj
+from curvify.formats.obj_read import read_obj
+from curvify.formats.obj_write import write_obj
 from curvify.formats.text import face_lines, vector_lines
 from curvify.mesh import Marks, PolygonMesh
 

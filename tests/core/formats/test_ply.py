@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from curvify.errors import FormatError
-from curvify.formats.ply import read_ply, write_ply
+from curvify.formats.ply_read import read_ply
+from curvify.formats.ply_write import write_ply
 from curvify.mesh import Marks, PolygonMesh
 
 XYZ = "property float x\nproperty float y\nproperty float z\n"

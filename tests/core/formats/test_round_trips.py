@@ -12,9 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from curvify.errors import FormatError
-from curvify.formats.obj import read_obj, write_obj
+from curvify.formats.obj_read import read_obj
+from curvify.formats.obj_write import write_obj
 from curvify.formats.off import read_off, write_off
-from curvify.formats.ply import read_ply, write_ply
+from curvify.formats.ply_read import read_ply
+from curvify.formats.ply_write import write_ply
 from curvify.mesh import Marks, PolygonMesh
 
 TYPES = [np.float32, np.float64]
