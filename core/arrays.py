@@ -31,7 +31,8 @@ def cross(a: Floats, b: Floats, axis: int = -1) -> Floats:
     """Cross products along an axis: ``numpy.cross`` for plain 3-vectors, in a third of its time."""
     if axis:
         a, b = np.moveaxis(a, axis, 0), np.moveaxis(b, axis, 0)
-    result = np.empty_like(a) if a.shape == b.shape else np.empty((3, *np.broadcast_shapes(a.shape[1:], b.shape[1:])))
+    alike = axis == 0 and a.shape == b.shape
+    result = np.empty_like(a) if alike else np.empty((3, *np.broadcast_shapes(a.shape[1:], b.shape[1:])))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         np.multiply(a[j], b[k], out=result[i])
@@ -48,6 +49,11 @@ def unit_rows(vectors: Floats) -> Floats:
 def take_rows(rows: Floats, index: Ints) -> Floats:
     """``rows[index]`` for ``rows (n,c)`` and indices ``(...)`` that are in range, in a quarter of its time."""
     return np.take(rows, index, axis=0, mode="clip")
+
+
+def gather(rows: Floats, index: Ints) -> Floats:
+    """``rows[index]`` for ``rows (n,c)`` and ``index (k,)`` in range, in memory column by column: steps run over k."""
+    return np.take(rows, index, axis=0, mode="clip").copy(order="F")
 
 
 def as_slice(rows: Ints) -> Ints | slice:

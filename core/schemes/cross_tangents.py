@@ -165,7 +165,7 @@ def project_with_slope(y: Floats, y_slope: Floats, normal: Floats, normal_slope:
     square = _dots(normal, normal)
     q = projection(normal, y, square)
     numerator = _dots(normal_slope, y) + _dots(normal, y_slope) - 2 * q * _dots(normal, normal_slope)
-    q_slope = numerator / np.maximum(square, SMALLEST)
+    q_slope = numerator * (square > 0) / np.maximum(square, SMALLEST)
     q, q_slope = q[:, None], q_slope[:, None]
     return y - q * normal, y_slope - q_slope * normal - q * normal_slope
 

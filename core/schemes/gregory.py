@@ -22,7 +22,7 @@ from curvify.sampling import kite_sampling
 from curvify.schemes.base import Basis, Form, PatchClass, Patches, bernstein
 from curvify.schemes.cross_tangents import PaperTangent, ProjectedBlend, Sides, dot
 from curvify.schemes.gregory_basis import center_row, edge_normal_basis, gregory_basis, side_speed
-from curvify.schemes.patchwork import Patchwork, build_patchwork
+from curvify.schemes.patchwork import FoldRule, Patchwork, build_patchwork
 
 CROSS_TANGENTS = ("precise", "smooth", "linear", "quadratic")
 NORMALS = ("exact", "paper")
@@ -77,14 +77,15 @@ def prepare(mesh: PolygonMesh, options: Options | None = None) -> Patches:
     """Patches for every face of the mesh. Raises MeshError where there is nothing to refine."""
     options = options or Options()
     coarse = prepare_mesh(mesh, options)
+    blended = options.cross_tangent in ("precise", "smooth")
 
     def inward(work: Patchwork, corners: Ints) -> CrossTangent:
         points, sides = patch_sides(work, corners)
-        if options.cross_tangent in ("precise", "smooth"):  # their fullness does not change the side
+        if blended:  # their fullness does not change the side
             return ProjectedBlend(sides, options.cross_tangent, np.zeros(corners.shape))
         return paper_tangent(sides, points, side_normals(work, corners), options.cross_tangent, np.ones(len(corners)))
 
-    work = build_patchwork(coarse, options.tangent_lengths, options.split_rule, inward)
+    work = build_patchwork(coarse, options.tangent_lengths, options.split_rule, FoldRule(inward, blended))
     shape = face_shapes(work, options)
     used = {"precise": ("bulge",), "smooth": ("bulge",), "quadratic": ("alpha",)}.get(options.cross_tangent, ())
     work.warnings += coarse.unused_marks(used, f"gregory with {options.cross_tangent} cross tangents")

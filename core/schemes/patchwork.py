@@ -7,11 +7,11 @@ where the patch would fold (Leung, Wang, Zhang, section 2.3; the fold tests are 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from curvify.arrays import cross, leading, take_rows, values_of
+from curvify.arrays import as_slice, cross, gather, leading, take_rows, unit_rows, values_of
 from curvify.convex import Split, split_at_corners, split_polygons
 from curvify.edges import bending_normals, edge_curves, normal_fields, smooth_tangents
 from curvify.mesh import Bools, Floats, Ints
@@ -20,7 +20,7 @@ from curvify.polygons import newell_normals
 from curvify.prepare import Coarse
 from curvify.records import field, record
 from curvify.sampling import Sampling
-from curvify.schemes.base import PatchClass, Patches, bernstein, bernstein_slope
+from curvify.schemes.base import PatchClass, Patches, bernstein, bernstein_basis, bernstein_slope, bernstein_slopes
 from curvify.schemes.cross_tangents import Sides
 from curvify.sectors import Features, end_normals, sides_of_edges
 from curvify.topology import Topology, link_half_edges
@@ -30,8 +30,10 @@ from curvify.words import count_of
 LEAST_CORNER_SINE = float(np.sin(np.radians(3.0)))
 #: Rounds of making corners and of splitting folded faces.
 ROUNDS = 4
-#: Patches looked at together in the fold tests.
-WINDOW = 512
+#: Patches looked at together in the fold tests, and normal fields.
+WINDOW, CONES = 512, 2048
+#: Abscissae at which sides are tested.
+PLACES = np.arange(1, 10) / 10
 
 
 class Inward(Protocol):
@@ -53,7 +55,8 @@ class Patchwork:
 
     ``topology`` of the pieces; ``split`` where they come from, in terms of the cleaned loops; per edge
     ``curves (3,E,4)``; ``fields (3,N,4)`` edge normals and ``side_field (C,)`` the one of each half-edge; ``normals
-    (C,3)`` of the corners; ``line_end (C,)`` whether the half-edge is a crease or boundary where it starts.
+    (C,3)`` of the corners. ``steps`` are those ``(3,C)`` from each corner to the next Bezier points ahead and
+    back, ``sines (C,)`` those of the angles between them.
     """
 
     coarse: Coarse
@@ -64,6 +67,8 @@ class Patchwork:
     fields: Floats
     side_field: Ints
     normals: Floats
+    steps: tuple[Floats, Floats]
+    sines: Floats
     warnings: list[str] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
 
@@ -122,28 +127,32 @@ class Patchwork:
         )
 
 
-def build_patchwork(
-    coarse: Coarse, lengths: str, split_rule: str, tangents_of: Callable[[Patchwork, Ints], Inward]
-) -> Patchwork:
+class FoldRule(NamedTuple):
+    """``tangents_of(work, corners)`` gives the scheme's cross tangents of some patches; ``blended``: whether they are,
+    but for the part along n_c and a positive factor, between those that the neighboring edges ask for.
+    """
+
+    tangents_of: Callable[[Patchwork, Ints], Inward]
+    blended: bool
+
+
+def build_patchwork(coarse: Coarse, lengths: str, split_rule: str, rule: FoldRule) -> Patchwork:
     """Split faces until no patch folds that splitting can save, and build all curves.
 
-    ``lengths`` is the rule of ``edges.tangent_lengths``; ``tangents_of(work, corners)`` gives the scheme's cross
-    tangents of some patches. What still folds is counted and warned of.
+    ``lengths`` is the rule of ``edges.tangent_lengths``. What still folds is counted and warned of.
     """
     loops = coarse.loops
     split = split_polygons(coarse.positions, loops.offsets, loops.vertices, rule=split_rule, max_sides=MAX_SIDES)
     corners = np.zeros(len(coarse.positions), dtype=bool)
     work = _build(coarse, coarse.features(corners), split, lengths)
-    sines = _corner_sines(work)
     for _ in range(ROUNDS - 1):
-        made = _new_corners(work, sines)
+        made = _new_corners(work)
         if not made.any():
             break
         corners |= made
         work = _build(coarse, coarse.features(corners), split, lengths)
-        sines = _corner_sines(work)
     for _ in range(ROUNDS):
-        bad, folded = _bad_corners(work, sines, tangents_of)
+        bad, folded = _bad_corners(work, rule)
         wide = work.topology.sizes[work.topology.faces] > 3
         if not (bad & wide).any():
             break
@@ -152,9 +161,8 @@ def build_patchwork(
             break
         split = closer
         work = _build(coarse, work.features, split, lengths)
-        sines = _corner_sines(work)
     else:
-        bad, folded = _bad_corners(work, sines, tangents_of)
+        bad, folded = _bad_corners(work, rule)
     _note_splits(work, folded)
     return work
 
@@ -179,8 +187,10 @@ def _build(coarse: Coarse, features: Features, split: Split, lengths: str) -> Pa
     curves = edge_curves(start, end, tangents[:, 0], tangents[:, 1], lengths)
     side_field, edge, pair = _sides(topology, normals, ends)
     fields = normal_fields(curves[edge], pair[:, 0], pair[:, 1], bending[edge])
+    steps = _corner_tangents(topology, positions, curves)
+    sines = _corner_sines(*steps, normals)
     curves, fields = curves.transpose(2, 0, 1), fields.transpose(2, 0, 1)
-    return Patchwork(coarse, features, split, topology, curves, fields, side_field, normals)
+    return Patchwork(coarse, features, split, topology, curves, fields, side_field, normals, steps, sines)
 
 
 def _sides(topology: Topology, normals: Floats, ends: Floats) -> tuple[Ints, Ints, Floats]:
@@ -224,15 +234,21 @@ def _piece_topology(coarse: Coarse, split: Split) -> Topology:
     return link_half_edges(coarse.positions, split.face_offsets, split.face_vertices, edges, edge)
 
 
-def _corner_sines(work: Patchwork) -> Floats:
+def _corner_tangents(topology: Topology, positions: Floats, curves: Floats) -> tuple[Floats, Floats]:
+    """Steps ``(3,C)`` from each corner to the next points of its two curves ``(E,4,3)``: ahead and back."""
+    point = gather(positions, topology.vertices).T
+    stored = curves.reshape(-1, 3)
+    forward = topology.forward
+    out = gather(stored, 4 * topology.edge + np.where(forward, 1, 2)).T - point
+    before = topology.prev
+    back = gather(stored, (4 * topology.edge + np.where(forward, 2, 1))[before]).T - point
+    return out, back
+
+
+def _corner_sines(out: Floats, back: Floats, normals: Floats) -> Floats:
     """Sine ``(C,)`` between the two curves at each corner, negative where the patch folds there."""
-    topology = work.topology
-    point = work.coarse.positions[topology.vertices].T
-    first, last = work.curves[:, :, 1][:, topology.edge], work.curves[:, :, 2][:, topology.edge]
-    out = np.where(topology.forward, first, last) - point
-    back = np.where(topology.forward, last, first)[:, topology.prev] - point
     lengths = np.sqrt(np.einsum("ic,ic->c", out, out) * np.einsum("ic,ic->c", back, back))
-    volume = np.einsum("ic,ci->c", cross(out, back, axis=0), work.normals)
+    volume = np.einsum("ic,ci->c", cross(out, back, axis=0), normals)
     return np.divide(volume, lengths, out=np.zeros_like(volume), where=lengths > 0)
 
 
@@ -249,7 +265,7 @@ def _straight_through(work: Patchwork, corners: Ints) -> Bools:
     return result
 
 
-def _new_corners(work: Patchwork, sines: Floats) -> Bools:
+def _new_corners(work: Patchwork) -> Bools:
     """Vertices ``(V,)`` to make corners: folded, on at least two creases or boundaries, normals computed."""
     made = np.zeros(len(work.coarse.positions), dtype=bool)
     if work.coarse.given is not None:
@@ -257,28 +273,31 @@ def _new_corners(work: Patchwork, sines: Floats) -> Bools:
     base, features = work.coarse.topology, work.features
     line = features.sharp | ~base.interior[:, None]
     lines = np.bincount(base.edges[line], minlength=len(made))
-    made[work.topology.vertices[sines < -1e-9]] = True
+    made[work.topology.vertices[work.sines < -1e-9]] = True
     return made & (lines >= 2) & ~features.corners
 
 
-def _bad_corners(
-    work: Patchwork, sines: Floats, tangents_of: Callable[[Patchwork, Ints], Inward]
-) -> tuple[Bools, Bools]:
+def _bad_corners(work: Patchwork, rule: FoldRule) -> tuple[Bools, Bools]:
     """Corners ``(C,)`` from which their faces should be split, and the pieces ``(P,)`` that fold.
 
     A corner is bad if it opens too little, unless two creases or boundaries pass straight through it by
     construction; a side is bad if its cross tangent does not point inwards, and counts for its narrower corner.
     """
+    topology, sines = work.topology, work.sines
     bad = sines <= LEAST_CORNER_SINE
     flat = np.flatnonzero(np.abs(sines) < 1e-9)
     bad[flat[_straight_through(work, flat)]] = False
-    folded = np.zeros(len(work.topology.offsets) - 1, dtype=bool)
-    folded[work.topology.faces[bad & (sines < 0)]] = True
+    folded = np.zeros(len(topology.offsets) - 1, dtype=bool)
+    folded[topology.faces[bad & (sines < 0)]] = True
+    unsure = np.ones(len(folded), dtype=bool)
+    if rule.blended:
+        unsure = np.bincount(topology.faces[~_surely_inward(work)], minlength=len(folded)) > 0
     for size, patches in work.size_classes():
+        patches = patches[unsure[patches]]
         for begin in range(0, len(patches), WINDOW):
             rows = patches[begin : begin + WINDOW]
-            corners = work.topology.offsets[rows][:, None] + np.arange(size)
-            inward = _least_inward(tangents_of(work, corners))
+            corners = topology.offsets[rows][:, None] + np.arange(size)
+            inward = _least_inward(rule.tangents_of(work, corners))
             face, side = np.nonzero(inward <= 0)
             if len(face):
                 folded[rows[face]] = True
@@ -288,10 +307,48 @@ def _bad_corners(
 
 
 def _least_inward(tangent: Inward) -> Floats:
-    """Smallest (C' x T).n_c ``(f,n)`` at 9 abscissae of each side, up to a positive factor."""
-    t = np.arange(1, 10) / 10
-    across = cross(bernstein(tangent.sides.fields, t), bernstein_slope(tangent.sides.curves, t), axis=0)
-    return tangent.towards(across, t).min(axis=-1)
+    """Smallest (C' x T).n_c ``(f,n)`` at some abscissae of each side, up to a positive factor."""
+    across = cross(bernstein(tangent.sides.fields, PLACES), bernstein_slope(tangent.sides.curves, PLACES), axis=0)
+    return tangent.towards(across, PLACES).min(axis=-1)
+
+
+def _surely_inward(work: Patchwork) -> Bools:
+    """Half-edges ``(C,)`` that ``_least_inward`` need not look at.
+
+    All its vectors n_c x C' lie in one cone, and the cross tangents, between those at the ends, in another, so close
+    that no two of them are perpendicular.
+    """
+    topology = work.topology
+    edges = np.empty(work.fields.shape[1], dtype=np.int64)
+    edges[work.side_field] = topology.edge
+    axes, spread = (np.concatenate(parts, axis=-1) for parts in zip(*_cones(work, edges), strict=True))
+    axis = gather(axes.T, work.side_field).T
+    out, back = work.steps
+    start = np.einsum("ic,ic->c", axis, unit_rows(back))
+    end = np.einsum("ic,ic->c", axis, unit_rows(out))[topology.next]
+    nearest = np.minimum(start, end)
+    nearest = np.where(topology.forward, nearest, -np.maximum(start, end))
+    spread = spread[work.side_field]
+    # cosines a, b of angles below 90 degrees: their sum is below 90 where a^2 + b^2 > 1
+    return (nearest > 0) & (spread > 0) & (nearest**2 + spread**2 > 1 + 1e-9)
+
+
+def _cones(work: Patchwork, edges: Ints) -> Iterator[tuple[Floats, Floats]]:
+    """For each normal field, by windows: the unit vector n_c x C' in the middle of its edge ``(3,w)``, and the smallest
+    cosine ``(w,)`` between it and those at the other places, 0 where one vanishes.
+    """
+    values, slopes = bernstein_basis(3, PLACES).T, bernstein_slopes(3, PLACES).T
+    for begin in range(0, len(edges), CONES):
+        rows = edges[begin : begin + CONES]
+        fields = np.ascontiguousarray(work.fields[:, begin : begin + CONES].transpose(2, 0, 1)).reshape(4, -1)
+        curves = np.ascontiguousarray(work.curves[:, as_slice(rows)].transpose(2, 0, 1)).reshape(4, -1)
+        normal, speed = (
+            (basis @ points).reshape(-1, 3, len(rows)).transpose(1, 0, 2)
+            for basis, points in ((values, fields), (slopes, curves))
+        )
+        across = unit_rows(cross(normal, speed, axis=0))
+        axis = across[:, len(PLACES) // 2]
+        yield axis, np.einsum("itc,ic->tc", across, axis).min(axis=0)
 
 
 def _note_splits(work: Patchwork, folded: Bools) -> None:
