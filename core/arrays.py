@@ -57,8 +57,8 @@ def gather(rows: Floats, index: Ints) -> Floats:
 
 
 def as_slice(rows: Ints) -> Ints | slice:
-    """Ascending rows as a slice where they follow each other: what is taken with it is not copied."""
-    together = len(rows) and rows[-1] - rows[0] == len(rows) - 1
+    """Rows as a slice where each follows the one before: what is taken with it is not copied."""
+    together = len(rows) and rows[-1] - rows[0] == len(rows) - 1 and bool((rows[1:] - rows[:-1] == 1).all())
     return slice(int(rows[0]), int(rows[-1]) + 1) if together else rows
 
 

@@ -103,7 +103,8 @@ class _Evaluation:
         faces = self.patches.source_faces
         fresh = np.concatenate([[True], faces[1:] != faces[:-1]])
         sizes = np.diff(starts, append=self.numbering.vertex_count)
-        group = (np.cumsum(np.maximum(sizes, PATCH)) - sizes) // WINDOW
+        counted = np.maximum(sizes, PATCH)
+        group = (np.cumsum(counted) - counted) // WINDOW
         heads = np.flatnonzero(fresh)
         bounds = heads[np.concatenate([[True], group[heads][1:] != group[heads][:-1]])]
         yield from itertools.pairwise([*bounds.tolist(), len(starts)])
@@ -241,7 +242,7 @@ class _Evaluation:
         """The cells of patches first to last."""
         cells = cells_of(self.numbering, self.patches, first, last)
         counts = np.diff(self.numbering.cell_starts[first : last + 1])
-        source_faces = np.repeat(self.patches.source_faces[first:last], counts)
+        source_faces = np.repeat(self.patches.source_faces[first:last].astype(np.int32), counts)
         sink.faces(int(self.numbering.cell_starts[first]), cells, source_faces)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from curvify.arrays import cross
+from curvify.arrays import cross, take_rows
 from curvify.mesh import Bools, Floats, Ints
 from curvify.polygons import next_corners, previous_corners
 
@@ -54,9 +54,9 @@ def corner_normals(
     is above pi.
     """
     sizes = np.diff(offsets)
-    points = positions[vertices]
-    ahead = points[next_corners(offsets)] - points
-    back = -ahead[previous_corners(offsets)]
+    points = take_rows(positions, vertices)
+    ahead = take_rows(points, next_corners(offsets)) - points
+    back = -take_rows(ahead, previous_corners(offsets))
     crosses = cross(ahead, back)
     sine, cosine = np.linalg.norm(crosses, axis=1), np.einsum("ci,ci->c", ahead, back)
     face_normals = np.repeat(unit(area), sizes, axis=0)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from curvify.arrays import cross, distinct
+from curvify.arrays import cross, take_rows, distinct
 from curvify.edges import ALONG, LEAST_ADVANCE, bending_normals, smooth_tangents
 from curvify.marks import ResolvedMarks
 from curvify.mesh import Bools, Floats, Ints
@@ -282,14 +282,14 @@ def _end_tangents(
     marks: ResolvedMarks,
 ) -> tuple[Floats, Floats]:
     """Unit tangents ``(E,2,3)`` and bending normals ``(E,3)`` of all edges."""
-    chord = positions[topology.edges[:, 1]] - positions[topology.edges[:, 0]]
+    chord = take_rows(positions, topology.edges[:, 1]) - take_rows(positions, topology.edges[:, 0])
     first, last = sides_of_edges(topology)
     mean = end_normals(topology, normals, first)
     several = np.flatnonzero(sharp.any(axis=1) | topology.nonmanifold)
     one, other = mean[several], end_normals(topology, normals, last[several])
     mean[several] = np.where((one == other).all(axis=2, keepdims=True), one, (one + other) / 2)
     faces = topology.faces
-    bending = bending_normals(chord, mean[:, 0], mean[:, 1], area[faces[first]] + area[faces[last]])
+    bending = bending_normals(chord, mean[:, 0], mean[:, 1], take_rows(area, faces[first]) + take_rows(area, faces[last]))
     mean[several] = unit(mean[several])
     bent = np.flatnonzero(marks.edge_normals.any(axis=1))
     bending[bent] = _marked_bending(marks.edge_normals[bent], bending[bent], chord[bent])
@@ -335,7 +335,7 @@ def _marked_bending(marked: Floats, own: Floats, chord: Floats) -> Floats:
 
 def end_normals(topology: Topology, normals: Floats, half_edges: Ints) -> Floats:
     """Normals ``(E,2,3)`` of the face of the given half-edges at the two ends in canonical direction."""
-    tail, head = normals[half_edges], normals[topology.next[half_edges]]
+    tail, head = take_rows(normals, half_edges), take_rows(normals, topology.next[half_edges])
     forward = topology.forward[half_edges][:, None]
     return np.stack([np.where(forward, tail, head), np.where(forward, head, tail)], axis=1)
 

@@ -244,13 +244,18 @@ def _cells_by_size(
     """For each polygon size: the patches (counted from ``first``) and their cells ``(f,Q,s)``."""
     offsets = patches.topology.offsets
     wide = numbering.vertex_count + numbering.repeat_count >= 2**31
+    kind = np.int64 if wide else np.int32
     for size in values_of(sizes):
         rows = np.flatnonzero(sizes == size)
         sampling = numbering.samplings[size]
         corners = offsets[first + rows][:, None] + np.arange(size)
-        step = np.arange(numbering.inner)
-        runs = numbering.run_starts[corners][..., None] + numbering.run_strides[corners][..., None] * step
-        inside = numbering.patch_starts[first + rows][:, None] + np.arange(len(sampling.points))
-        local = np.concatenate([numbering.corner_wedges[corners], runs.reshape(len(rows), -1), inside], axis=1)
-        local = local.astype(np.int64 if wide else np.int32)
+        ends = size * (1 + numbering.inner)
+        local = np.empty((len(rows), ends + len(sampling.points)), dtype=kind)
+        local[:, :size] = numbering.corner_wedges[corners]
+        starts, strides = (values[corners].astype(kind) for values in (numbering.run_starts, numbering.run_strides))
+        runs = local[:, size:ends].reshape(len(rows), size, numbering.inner)
+        np.multiply(strides[..., None], np.arange(numbering.inner, dtype=kind), out=runs)
+        runs += starts[..., None]
+        inside = numbering.patch_starts[first + rows].astype(kind)
+        np.add(inside[:, None], np.arange(len(sampling.points), dtype=kind), out=local[:, ends:])
         yield rows, np.take(local, sampling.cells, axis=1, mode="clip")

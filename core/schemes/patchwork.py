@@ -171,11 +171,11 @@ def _build(coarse: Coarse, features: Features, split: Split, lengths: str) -> Pa
     """Curves and fields of all edges of the pieces."""
     positions, base = coarse.positions, coarse.topology
     topology = _piece_topology(coarse, split)
-    normals = features.normals[split.source_corners]
+    normals = take_rows(features.normals, split.source_corners)
     count = len(base.edges)
     first, _ = sides_of_edges(topology)
     ends = end_normals(topology, normals, first)
-    start, end = positions[topology.edges[:, 0]], positions[topology.edges[:, 1]]
+    start, end = take_rows(positions, topology.edges[:, 0]), take_rows(positions, topology.edges[:, 1])
     tangents, bending = features.tangents, features.bending
     if len(topology.edges) > count:
         a, b = ends[count:, 0], ends[count:, 1]
@@ -186,7 +186,7 @@ def _build(coarse: Coarse, features: Features, split: Split, lengths: str) -> Pa
         tangents, bending = np.concatenate([tangents, across]), np.concatenate([bending, extra])
     curves = edge_curves(start, end, tangents[:, 0], tangents[:, 1], lengths)
     side_field, edge, pair = _sides(topology, normals, ends)
-    fields = normal_fields(curves[edge], pair[:, 0], pair[:, 1], bending[edge])
+    fields = normal_fields(curves[as_slice(edge)], pair[:, 0], pair[:, 1], bending[as_slice(edge)])
     steps = _corner_tangents(topology, positions, curves)
     sines = _corner_sines(*steps, normals)
     curves, fields = curves.transpose(2, 0, 1), fields.transpose(2, 0, 1)
