@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from curvify.arrays import cross, take_rows, distinct
+from curvify.arrays import cross, distinct, take_rows
 from curvify.edges import ALONG, LEAST_ADVANCE, bending_normals, smooth_tangents
 from curvify.marks import ResolvedMarks
 from curvify.mesh import Bools, Floats, Ints
@@ -288,8 +288,8 @@ def _end_tangents(
     several = np.flatnonzero(sharp.any(axis=1) | topology.nonmanifold)
     one, other = mean[several], end_normals(topology, normals, last[several])
     mean[several] = np.where((one == other).all(axis=2, keepdims=True), one, (one + other) / 2)
-    faces = topology.faces
-    bending = bending_normals(chord, mean[:, 0], mean[:, 1], take_rows(area, faces[first]) + take_rows(area, faces[last]))
+    beside = take_rows(area, topology.faces[first]) + take_rows(area, topology.faces[last])
+    bending = bending_normals(chord, mean[:, 0], mean[:, 1], beside)
     mean[several] = unit(mean[several])
     bent = np.flatnonzero(marks.edge_normals.any(axis=1))
     bending[bent] = _marked_bending(marks.edge_normals[bent], bending[bent], chord[bent])

@@ -10,10 +10,12 @@ Beyond the usual properties, curvify reads (and writes) its marks and attributes
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from curvify.arrays import take_rows
 from curvify.errors import FormatError
 from curvify.formats.ply_header import Header, read_header
 from curvify.formats.ply_tables import Table, read_tables
@@ -90,6 +92,9 @@ def _has(table: Table, *names: str) -> bool:
 
 def _floats(table: Table, *names: str) -> Floats:
     """Scalar properties side by side ``(count,k)`` float64, rounded to the declared type."""
+    side_by_side = table.side_by_side(*names)
+    if side_by_side is not None:
+        return side_by_side.astype(np.float64)
     out = np.empty((table.element.count, len(names)))
     with np.errstate(over="ignore", invalid="ignore"):
         for k, name in enumerate(names):
@@ -99,13 +104,13 @@ def _floats(table: Table, *names: str) -> Floats:
     return out
 
 
-def _to_ints(table: Table, name: str, values: NDArray[np.generic], rows: Ints | None = None) -> Ints:
-    """Stored values as int64; raises FormatError where a float among them is no whole number."""
+def _to_ints(table: Table, name: str, values: NDArray[np.generic], counts: Ints | None = None) -> Ints:
+    """Stored values as int64, one for each row or ``counts``; raises FormatError where a float is no whole number."""
     if values.dtype.kind == "f":
         with np.errstate(invalid="ignore"):
             wrong = np.flatnonzero(~((np.abs(values) < _FAR) & (values == np.floor(values))))
         if len(wrong):
-            row = int(wrong[0]) if rows is None else int(rows[wrong[0]])
+            row = int(wrong[0]) if counts is None else int(_rows_of(counts)[wrong[0]])
             raise table.error(row, f"property '{name}' has a value that is not a whole number")
     elif values.dtype == np.uint64 or values.dtype == np.dtype(">u8"):
         values = np.minimum(values, np.uint64(2**62))
@@ -118,8 +123,8 @@ def _positions(vertex: Table) -> tuple[Floats, np.dtype[np.floating]]:
             f"{vertex.body.name}:{vertex.element.line}: element 'vertex' has no properties x, y and z"
         )
     positions = _floats(vertex, "x", "y", "z")
-    wild = np.flatnonzero(~np.isfinite(positions).all(axis=1))
-    if len(wild):
+    if not np.isfinite(positions).all():
+        wild = np.flatnonzero(~np.isfinite(positions).all(axis=1))
         raise vertex.error(
             wild[0], f"vertex {wild[0]} has a coordinate that is not a finite number; remove or mend it"
         )
@@ -127,23 +132,27 @@ def _positions(vertex: Table) -> tuple[Floats, np.dtype[np.floating]]:
     return positions, np.dtype(np.float64 if double else np.float32)
 
 
-def _index_lists(table: Table) -> tuple[Ints, Ints, Ints]:
-    """Lengths, items and the row of each item of the vertex index list."""
+def _rows_of(counts: Ints) -> Ints:
+    """The row of each item of a list property."""
+    return np.repeat(np.arange(len(counts)), counts)
+
+
+def _index_lists(table: Table) -> tuple[Ints, Ints]:
+    """Lengths and items of the vertex index list."""
     name = next((n for n in _INDEX_NAMES if n in table.slots and table.slots[n].count_type is not None), None)
     if name is None:
         if not table.element.count:
-            return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
+            return np.zeros(0, np.int64), np.zeros(0, np.int64)
         place = f"{table.body.name}:{table.element.line}"
         raise FormatError(f"{place}: element '{table.element.name}' has no list property vertex_indices")
     counts, items = table.lists(name)
-    rows = np.repeat(np.arange(len(counts)), counts)
-    return counts, _to_ints(table, name, items, rows), rows
+    return counts, _to_ints(table, name, items, counts).reshape(-1)
 
 
-def _check_range(table: Table, indices: Ints, rows: Ints, vertices: int) -> None:
-    wrong = np.flatnonzero((indices < 0) | (indices >= vertices))
-    if len(wrong):
-        row = int(rows[wrong[0]])
+def _check_range(table: Table, indices: Ints, vertices: int, rows: Callable[[], Ints]) -> None:
+    if len(indices) and not (indices.min() >= 0 and indices.max() < vertices):
+        wrong = np.flatnonzero((indices < 0) | (indices >= vertices))
+        row = int(rows()[wrong[0]])
         what = f"{table.element.name} {row} refers to vertex {indices[wrong[0]]}"
         raise table.error(row, f"{what}, the file has {vertices} (counted from 0)")
 
@@ -153,12 +162,12 @@ def _faces(tables: dict[str, Table], vertices: int, warnings: list[str]) -> _Fac
     faces = _Faces(np.zeros(0, np.int64), np.zeros(0, np.int64))
     if "face" in tables:
         table = tables["face"]
-        counts, indices, rows = _index_lists(table)
-        _check_range(table, indices, rows, vertices)
+        counts, indices = _index_lists(table)
+        _check_range(table, indices, vertices, lambda: _rows_of(counts))
         kept = counts >= 3
         if not kept.all():
             warnings.append(_skipped(int((~kept).sum()), int(np.argmin(kept))))
-            indices = indices[kept[rows]]
+            indices = indices[np.repeat(kept, counts)]
         faces = _Faces(counts[kept], indices, table, kept)
     if "tristrips" in tables:
         triangles = _strip_triangles(tables["tristrips"], vertices)
@@ -182,9 +191,9 @@ def _skipped(count: int, first: int) -> str:
 
 def _strip_triangles(table: Table, vertices: int) -> Ints:
     """Triangles ``(n,3)`` of strips in which -1 starts anew; every second one is turned round."""
-    _, items, rows = _index_lists(table)
-    real = items != -1
-    _check_range(table, items[real], rows[real], vertices)
+    counts, items = _index_lists(table)
+    rows, real = _rows_of(counts), items != -1
+    _check_range(table, items[real], vertices, lambda: rows[real])
     if len(items) < 3:
         return np.zeros((0, 3), dtype=np.int64)
     begins = np.ones(len(items), dtype=np.bool_)
@@ -204,12 +213,13 @@ def _normals(vertex: Table, faces: _Faces) -> Floats | None:
     if not _has(vertex, "nx", "ny", "nz"):
         return None
     normals = _floats(vertex, "nx", "ny", "nz")
-    normals[~(np.isfinite(normals).all(axis=1) & normals.any(axis=1))] = np.nan
-    return _or_none(normals[faces.vertices])
+    if not (np.isfinite(normals).all() and np.einsum("vi,vi->v", normals, normals).all()):
+        normals[~(np.isfinite(normals).all(axis=1) & normals.any(axis=1))] = np.nan
+    return _or_none(take_rows(normals, faces.vertices))
 
 
 def _or_none(rows: Floats) -> Floats | None:
-    return None if np.isnan(rows).all() else rows
+    return None if np.isnan(rows[:1]).all() and np.isnan(rows).all() else rows
 
 
 def _uvs(vertex: Table, faces: _Faces, warnings: list[str]) -> Floats | None:
@@ -222,7 +232,7 @@ def _uvs(vertex: Table, faces: _Faces, warnings: list[str]) -> Floats | None:
         if _has(vertex, *pair):
             uvs = _floats(vertex, *pair)
             uvs[~np.isfinite(uvs).all(axis=1)] = np.nan
-            return _or_none(uvs[faces.vertices])
+            return _or_none(take_rows(uvs, faces.vertices))
     return None
 
 
@@ -230,6 +240,7 @@ def _face_uvs(table: Table, faces: _Faces, warnings: list[str]) -> Floats | None
     """The texcoord lists of the faces, two numbers for each corner."""
     assert faces.kept is not None
     counts, items = table.lists("texcoord")
+    items = items.reshape(-1)
     declared = table.element.type_of("texcoord")
     with np.errstate(over="ignore", invalid="ignore"):
         values = (
@@ -300,7 +311,7 @@ def _edge_marks(tables: dict[str, Table]) -> Marks:
     columns = [_to_ints(table, n, table.column(n)) for n in ("vertex1", "vertex2")]
     rows = np.arange(table.element.count)
     for column in columns:
-        _check_range(table, column, rows, tables["vertex"].element.count)
+        _check_range(table, column, tables["vertex"].element.count, lambda: rows)
     edges = np.stack(columns, axis=1)
     if _has(table, "crease"):
         ends = ("crease", "crease2" if _has(table, "crease2") else "crease")

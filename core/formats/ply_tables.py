@@ -93,15 +93,26 @@ class Table:
             return self._strided(slot.offset, slot.type, 1)[:, 0]
         return _gather(self.body.blob, self.anchors[slot.anchor] + slot.offset, slot.type)
 
+    def side_by_side(self, *names: str) -> NDArray[np.generic] | None:
+        """Scalar properties ``(count,k)`` of one type that lie one after the other in rows of equal size, without a
+        copy; None where they do not, or where they are not stored in the type that was declared.
+        """
+        slots = [self.slots[name] for name in names]
+        kind, size = slots[0].type, slots[0].type.itemsize
+        apart = any(slot.type != kind or slot.offset != slots[0].offset + i * size for i, slot in enumerate(slots))
+        if not self.stride or apart or any(self.element.type_of(name) != kind.newbyteorder("=") for name in names):
+            return None
+        return self._strided(slots[0].offset, kind, len(names))
+
     def lists(self, name: str) -> tuple[Ints, NDArray[np.generic]]:
-        """A list property: the lengths ``(count,)`` and all items one after the other."""
+        """A list property: the lengths ``(count,)`` and all items one after the other, as rows where lengths agree."""
         slot = self.slots[name]
         assert slot.count_type is not None
         if self.stride:
             counts = self._strided(slot.offset, slot.count_type, 1)[:, 0].astype(np.int64)
             length = int(counts[0]) if len(counts) else 0
             items = self._strided(slot.offset + slot.count_type.itemsize, slot.type, length)
-            return counts, items.reshape(-1)
+            return counts, items
         starts = self.anchors[slot.anchor] + slot.offset
         counts = _gather(self.body.blob, starts, slot.count_type).astype(np.int64)
         size = slot.type.itemsize
