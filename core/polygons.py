@@ -43,17 +43,6 @@ def previous_corners(face_offsets: Ints) -> Ints:
     return before
 
 
-def corner_crosses(positions: Floats, face_offsets: Ints, face_vertices: Ints) -> Floats:
-    """Cross of the side to the next and the side to the previous vertex at each corner, ``(C,3)``.
-
-    It points out of the face where the corner is convex and into it where the corner is reflex; its
-    length is the product of the two sides and the sine of the corner. Not normalized.
-    """
-    points = positions[face_vertices]
-    sides = points[next_corners(face_offsets)] - points
-    return cross(sides[previous_corners(face_offsets)], sides)
-
-
 def newell_normals(positions: Floats, face_offsets: Ints, face_vertices: Ints) -> Floats:
     """Area vector of each face ``(F,3)``: its length is twice the area. Faces without corners get zero."""
     points = positions[face_vertices]

@@ -13,6 +13,9 @@ from pathlib import Path
 import pytest
 from click import __file__ as click_file
 
+import curvify
+from surfaces import torus
+
 CURVIFY = [sys.executable, "-c", "from curvify.cli.main import main; main()"]
 LONG = ["-k", "400"]  # minutes
 
@@ -139,3 +142,25 @@ def test_standard_output_holds_data_only(process):
     assert result.code == 0
     assert "warning" in result.err
     assert b"curvify" not in result.out
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the peak memory of a process is read from /proc")
+def test_a_million_faces_take_little_memory(folder: Path) -> None:
+    curvify.write(torus(64, 64), "coarse.ply")
+    code = "from curvify.cli.main import main; from pathlib import Path\n"
+    code += "try: main()\nfinally: print(Path('/proc/self/status').read_text())"
+    arguments = ["refine", "coarse.ply", "dense.ply", "--level", "8", "--threads", "2", "--quiet"]
+    ended = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, check=True, timeout=60)
+    assert b"element face 1048576" in (folder / "dense.ply").read_bytes()[:1000]
+    peak = next(int(line.split()[1]) for line in ended.stdout.decode().splitlines() if line.startswith("VmHWM"))
+    assert peak < 110_000, "kilobytes; the file has 53,000, and 70,000 were enough when this was written"
+
+
+def test_the_installed_command_ends_with_the_code_and_the_whole_output(folder: Path) -> None:
+    command = [sys.executable, "-c", "from curvify.cli.main import command; command()"]
+    ended = subprocess.run(
+        [*command, "refine", "cube.obj", "-", "--output-format", "obj"], capture_output=True, timeout=60, check=True
+    )
+    assert ended.stdout.count(b"\nf ") == 6 * 25
+    assert subprocess.run([*command, "refine", "none.obj", "x.ply"], capture_output=True, check=False).returncode == 2
+    assert b"curvify" in subprocess.run([*command, "--version"], capture_output=True, check=True).stdout

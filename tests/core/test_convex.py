@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from curvify import dissect
-from curvify.convex import Split, split_at_corners, split_polygons, whole_faces
+from curvify.convex import Split, _assemble, split_at_corners, split_polygons
 from curvify.errors import OptionError
 from curvify.mesh import Bools, Floats, Ints
-from curvify.polygons import corner_crosses, judge, newell_normals, next_corners, previous_corners
+from curvify.polygons import judge, newell_normals, next_corners, previous_corners
 
 Faces = list[list[int]]
 Points = list[tuple[float, float]]
@@ -39,6 +39,19 @@ TWO_HOLES: Keyhole = (
     [(0, 0), (8, 0), (8, 4), (0, 4), (1, 1), (1, 3), (3, 3), (3, 1), (5, 1), (5, 3), (7, 3), (7, 1)],
     [0, 1, 11, 8, 9, 10, 11, 1, 2, 3, 0, 4, 5, 6, 7, 4],
 )
+
+
+def whole_faces(face_offsets: np.ndarray, face_vertices: np.ndarray) -> Split:
+    """Every face as one piece."""
+    reasons = np.zeros(len(face_offsets) - 1, dtype=np.uint8)
+    return _assemble(face_offsets, face_vertices, np.zeros((0, 2), dtype=np.int64), reasons)
+
+
+def corner_crosses(positions: np.ndarray, face_offsets: np.ndarray, face_vertices: np.ndarray) -> np.ndarray:
+    """Cross of the side to the next and the side to the previous vertex at each corner ``(C,3)``."""
+    points = positions[face_vertices]
+    sides = points[next_corners(face_offsets)] - points
+    return np.cross(sides[previous_corners(face_offsets)], sides)
 
 
 def star(points: int) -> Points:
@@ -561,8 +574,3 @@ def test_area_vectors_are_accurate_far_from_the_origin() -> None:
     points = space(L_SHAPE) / 1024 + 2.0**20
     areas = newell_normals(points, *rows([range(6), [], [5, 0, 1]])) * 2.0**20
     assert np.array_equal(areas, [[0, 0, 6], [0, 0, 0], [0, 0, 4]])
-
-
-def test_corner_crosses_point_out_of_convex_corners() -> None:
-    crosses = corner_crosses(space(L_SHAPE), *rows([range(6)]))
-    assert crosses[:, 2].tolist() == [4, 2, 1, -1, 1, 2]
