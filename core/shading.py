@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from curvify.mesh import Floats
 from curvify.normals import dot, sum_by, unit
+from curvify.records import replaced
 from curvify.schemes.base import Patches
 from curvify.sectors import sides_of_edges
 
@@ -28,10 +27,10 @@ def weld_normals(patches: Patches) -> Patches:
     total = fields[:, patches.side_field[first[edges]]] + fields[:, patches.side_field[last[edges]]]
     own = np.moveaxis(fields[:, edges][..., [0, -1]], 0, -1)
     other = np.moveaxis(fields[:, patches.side_field[last[edges]]][..., [0, -1]], 0, -1)
-    opposed = (dot(unit(own), unit(other)) < OPPOSITE).any(axis=(1, 2))
+    opposed = (dot(unit(own), unit(other)) < OPPOSITE).any(axis=2).any(axis=1)
     fields[:, edges] = np.where(opposed[:, None], fields[:, edges], total)
     normals = _vertex_normals(patches)
-    return replace(patches, fields=fields, side_field=topology.edge.copy(), normals=normals)
+    return replaced(patches, fields=fields, side_field=topology.edge.copy(), normals=normals)
 
 
 def _vertex_normals(patches: Patches) -> Floats:

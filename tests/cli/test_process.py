@@ -161,6 +161,6 @@ def test_the_installed_command_ends_with_the_code_and_the_whole_output(folder: P
     ended = subprocess.run(
         [*command, "refine", "cube.obj", "-", "--output-format", "obj"], capture_output=True, timeout=60, check=True
     )
-    assert ended.stdout.count(b"\nf ") == 6 * 25
+    assert ended.stdout.count(b"\nf ") == 6 * 100
     assert subprocess.run([*command, "refine", "none.obj", "x.ply"], capture_output=True, check=False).returncode == 2
     assert b"curvify" in subprocess.run([*command, "--version"], capture_output=True, check=True).stdout
