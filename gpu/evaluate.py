@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from curvify import evaluate
+from curvify import evaluate, tables
 from curvify.errors import DeviceError
 from curvify.gpu.products import Products, Singles, Table, pack_columns
 from curvify.gpu.programs import NORMALS, UNIT, VALUES, Kind
@@ -154,14 +154,13 @@ class GpuBackend:
         left = np.arange(len(rows))
         controls = form.controls(rows)
         for count in NODE_COUNTS:
-            nodes = controls.fields(evaluate.chebyshev_points(count))
+            nodes = controls.fields(tables.chebyshev_points(count))
             enough = _enough_points(nodes)
             part = np.flatnonzero(enough)
             if len(part):
                 vectors = Vectors.pack(controls.linear[:, part], form.points, nodes[:, part])
-                tables = evaluate.tables(form, points, grid, count, kind.orders)
-                with self.products.sent(vectors.columns, min(len(points), evaluate.SAMPLES)) as sent:
-                    for block in tables:
+                with self.products.sent(vectors.columns, min(len(points), tables.SAMPLES)) as sent:
+                    for block in tables.blocks(form, points, grid, count, kind.orders):
                         values = self.products.multiply(kind, _block_table(form, grid, count, block), sent)
                         place = _place(left[part]), slice(block.first, block.last)
                         if positions is not None:
@@ -182,7 +181,7 @@ def _enough_points(nodes: Floats) -> Bools:
     return evaluate.enough_points(nodes, SERIES_TOLERANCE)
 
 
-def _block_table(form: Form, grid: tuple[int, int], count: int, block: evaluate.Tables) -> Table:
+def _block_table(form: Form, grid: tuple[int, int], count: int, block: tables.Tables) -> Table:
     """A block of a form's tables, under a name for the device."""
     assert block.matrix is not None
     samples = block.last - block.first
