@@ -41,7 +41,23 @@ EXPECTED = {
     "mixed": Expected(25, 25, 96, {3: 12, 4: 6, 5: 6, 6: 1}, {3: 12, 4: 6, 5: 6, 6: 1}, flatness=0.04),
     "l_part": Expected(12, 8, 36, {4: 6, 6: 2}, {3: 12}, convex=False),
     "cylinder": Expected(24, 14, 72, {4: 12, 12: 2}, {3: 24}),
+    "ring": Expected(48, 48, 192, {4: 48}, {4: 48}, genus=1),
+    "ball": Expected(72, 62, 264, {4: 60, 12: 2}, {3: 24, 4: 48}),
+    "knob": Expected(48, 42, 176, {4: 40, 8: 2}, {3: 16, 4: 32}),
 }
+MARKED = (
+    "ring-a-plain",
+    "ring-b-flat",
+    "ring-c-level",
+    "ring-d-cones",
+    "ring-e-flat-creased",
+    "ring-f-creased",
+    "mushroom-sharp",
+    "pawn-sharp",
+    "knob-hard",
+    "ball-darts",
+    "cylinder-soft",
+)
 
 each_sample = pytest.mark.parametrize("name", sorted(EXPECTED))
 
@@ -94,9 +110,9 @@ def test_script_reproduces_the_committed_files(tmp_path: Path) -> None:
     run = subprocess.run([sys.executable, str(SCRIPT), str(target)], capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     made = {path.name: path.read_bytes() for path in target.iterdir()}
-    assert set(made) == {f"{name}.obj" for name in EXPECTED}
-    assert made == {path.name: path.read_bytes() for path in FOLDER.glob("*.obj")}
-    assert len(run.stdout.splitlines()) == len(EXPECTED)
+    assert set(made) == {f"{name}.obj" for name in EXPECTED} | {f"{name}.json" for name in MARKED}
+    assert made == {path.name: path.read_bytes() for end in ("obj", "json") for path in FOLDER.glob(f"*.{end}")}
+    assert len(run.stdout.splitlines()) == len(EXPECTED) + len(MARKED)
 
 
 @each_sample
@@ -140,6 +156,15 @@ def test_table_in_the_readme(name: str) -> None:
     assert len(rows) == 1
     cells = [cell.strip() for cell in rows[0].strip("|").split("|")]
     assert cells[2:4] == [str(EXPECTED[name].faces), str(EXPECTED[name].corners)]
+
+
+@pytest.mark.parametrize("name", MARKED)
+def test_marked_samples_stand_in_the_readme(name: str) -> None:
+    """Each marks file has a row in the README's second table, with the mesh that it is for."""
+    text = (FOLDER / "README.md").read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line.startswith(f"| `{name}.json` |")]
+    assert len(rows) == 1
+    assert f"`{name.split('-')[0]}.obj`" in rows[0]
 
 
 @each_sample
