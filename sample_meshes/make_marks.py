@@ -157,11 +157,10 @@ def knob_hard() -> Marked:
 
 
 def ball_darts() -> Marked:
-    """Return three creases over the top of a ball, which fade where they end."""
+    """Return three creases down the sides of the ball, which fade where they end."""
     marked = Marked("ball-darts", "ball", "three creases that fade where they end")
-    for k in (0, 4, 8):
-        path = [12 * ring + k for ring in (1, 2, 3)]
-        marked.mark_edges(pairwise(path), crease=1)
+    for k in (0, 2, 4):
+        marked.mark_edges(pairwise(6 * ring + k for ring in range(4)), crease=1)
     return marked
 
 

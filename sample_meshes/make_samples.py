@@ -159,10 +159,10 @@ def ring() -> Sample:
 
 
 def ball() -> Sample:
-    """Return a ball of twelve sides with a polygon of twelve sides at either end."""
-    polar = np.radians(np.linspace(160.0, 20.0, 6))
-    vertices, faces = revolve([(float(np.sin(a)), float(-np.cos(a))) for a in polar[::-1]], 12)
-    return Sample("ball", "ball: 60 quads and two polygons of 12 sides on the unit sphere", vertices, faces)
+    """Return a ball of six sides with a hexagon at either end, few enough faces for creases to show."""
+    polar = np.radians([150.0, 110.0, 70.0, 30.0])
+    vertices, faces = revolve([(float(np.sin(a)), float(np.cos(a))) for a in polar], 6)
+    return Sample("ball", "ball: 18 quads and two hexagons on the unit sphere", vertices, faces)
 
 
 def knob() -> Sample:

@@ -42,7 +42,7 @@ EXPECTED = {
     "l_part": Expected(12, 8, 36, {4: 6, 6: 2}, {3: 12}, convex=False),
     "cylinder": Expected(24, 14, 72, {4: 12, 12: 2}, {3: 24}),
     "ring": Expected(48, 48, 192, {4: 48}, {4: 48}, genus=1),
-    "ball": Expected(72, 62, 264, {4: 60, 12: 2}, {3: 24, 4: 48}),
+    "ball": Expected(24, 20, 84, {4: 18, 6: 2}, {3: 12, 4: 12}),
     "knob": Expected(48, 42, 176, {4: 40, 8: 2}, {3: 16, 4: 32}),
 }
 MARKED = (
