@@ -70,12 +70,7 @@ class Coarse:
 
     def note_features(self, features: Features) -> tuple[dict[str, int], list[str]]:
         """Counts of sharp features for the report, and what there is to warn of."""
-        topology = self.topology
-        sides = [end_normals(topology, features.normals, half_edges) for half_edges in sides_of_edges(topology)]
-        apart = topology.interior & (sides[0] != sides[1]).any(axis=(1, 2))
-        unmarked = np.flatnonzero(apart & ~self.marks.crease.any(axis=1))
-        asked = self.marks.corner[topology.edges[unmarked]].any(axis=1)
-        unmarked = unmarked[~asked]
+        unmarked = self._broken_edges(features)
         counts = {
             "crease_edges": int(features.sharp.any(axis=1).sum()),
             "corner_vertices": int(features.corners.sum()),
@@ -84,7 +79,7 @@ class Coarse:
         }
         notes = []
         if len(unmarked):
-            a, b = topology.edges[unmarked[0]]
+            a, b = self.topology.edges[unmarked[0]]
             notes.append(
                 f"{count_of(len(unmarked), 'edge')} without a mark not smooth at an end, first: {a}-{b}; "
                 "creases or rims turn there too sharply for one tangent plane"
@@ -95,6 +90,16 @@ class Coarse:
                 "no curve along an edge fits all its faces"
             )
         return counts, notes
+
+    def _broken_edges(self, features: Features) -> Ints:
+        """Interior edges that nothing asks to be sharp and whose faces still have two normals at an end."""
+        if not features.corners.any() and not features.adjusted:
+            return np.zeros(0, dtype=np.int64)
+        topology, marks = self.topology, self.marks
+        one, other = (end_normals(topology, features.normals, sides) for sides in sides_of_edges(topology))
+        apart = topology.interior & (one != other).any(axis=(1, 2))
+        asked = marks.crease.any(axis=1) | marks.corner[topology.edges].any(axis=1)
+        return np.flatnonzero(apart & ~asked)
 
     def unused_marks(self, used: tuple[str, ...], scheme: str) -> list[str]:
         """Warnings of marks ``bulge``, ``alpha`` and ``kappa`` that are not among those that a scheme has a use for."""

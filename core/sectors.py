@@ -103,6 +103,8 @@ def _straighten_lines(
 
     Not where a crease runs into a rim: no plane holds both, and the rim turns there.
     """
+    if not lined.any():
+        return
     rim = _touched(topology, ~topology.interior)
     tangled = _touched(topology, topology.nonmanifold)
     crossed = rim & ~tangled & _touched(topology, sharp[:, 0] | sharp[:, 1])
@@ -320,6 +322,8 @@ def _points(topology: Topology, sharp: Bools, marked: Floats) -> tuple[Bools, Fl
 
     Those marked with a sharpness ``(V,)`` that fewer than two creases or boundaries run into: the tip of a cone.
     """
+    if not marked.any():
+        return np.zeros(len(marked), dtype=bool), np.ones(len(marked))
     line = sharp | ~topology.interior[:, None]
     lines = np.bincount(topology.edges[line], minlength=topology.vertex_count)
     return (marked > 0) & (lines < 2), np.where(marked > 0, marked, 1.0)
