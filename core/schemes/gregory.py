@@ -118,10 +118,12 @@ class FaceShapes:
 
 
 def face_shapes(work: Patchwork, options: Options) -> FaceShapes:
-    """The options, but for faces with a mark of their own."""
+    """The options, but for faces with a mark of their own. Raises OptionError for a bulge that would fold."""
     marks, source = work.coarse.marks, work.split.source_faces
     bulge = np.where(np.isnan(marks.bulge), options.bulge, marks.bulge)
     alpha = np.where(np.isnan(marks.alpha), options.alpha, marks.alpha)
+    if options.cross_tangent == "smooth" and bulge.min(initial=0.0) <= -1:
+        raise OptionError(f"a bulge of {bulge.min():g} folds the patches of 'smooth'; it must be above -1")
     return FaceShapes(bulge[source], alpha[source])
 
 

@@ -360,6 +360,8 @@ def test_alpha_of_a_face() -> None:
 def test_bulges_that_the_cross_tangent_cannot_show_are_named() -> None:
     with pytest.raises(curvify.OptionError, match="bulge"):
         curvify.surface(cube(), cross_tangent="linear", bulge=0.1)
+    with pytest.raises(curvify.OptionError, match="above -1"):
+        curvify.surface(cube(), cross_tangent="smooth", bulge=-1.0)
     bulged = Marks(bulged_faces=np.array([1]), bulges=np.array([0.1]))
     assert any("bulge" in text for text in curvify.surface(cube(), cross_tangent="linear", marks=bulged).warnings)
     full = Marks(full_faces=np.array([1]), alphas=np.array([2.0]))
