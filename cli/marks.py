@@ -86,6 +86,6 @@ def marks_file(
     else:
         write_marks(found, output)
     for source, counts in coarse.marks.counts.items():
-        console.explain(f"{name}: {source}: {', '.join(f'{n} {kind}' for kind, n in counts.items())}")
+        console.explain(f"{name}: {source}: {', '.join(count_of(n, kind) for kind, n in counts.items())}")
     listed = ", ".join(count_of(n, f"{kind} mark") for kind, n in found.counts().items())
     console.explain(f"{files.shown_name(output, 'stdout')}: {listed or 'no marks'}")

@@ -232,6 +232,8 @@ def _refine(run: Run, console: Console) -> None:
     options = ", ".join(f"{name} {value}" for name, value in plain_options(run.options).items())
     console.explain(f"{request.source}: {_sizes(run.surface.patches.counts)}")
     console.explain(f"scheme {request.scheme}, level {request.level}, {options}, {run.dtype.name}")
+    for source, counts in run.surface.patches.marks.items():
+        console.explain(f"{source}: {', '.join(count_of(number, kind) for kind, number in counts.items())}")
     recorder = Recorder(run.surface.patches) if request.report is not None else None
     with ExitStack() as stack:
         with timed(run.seconds, "open_backend"):

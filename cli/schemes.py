@@ -43,16 +43,19 @@ def describe(name: str) -> dict[str, Any]:
     """What a scheme's module says about it."""
     from dataclasses import fields
 
+    from curvify.options import MeshOptions
     from curvify.schemes import load_scheme
 
     module = load_scheme(name)
+    shared = {field.name: field.default for field in fields(MeshOptions)}
+    own = {field.name: field.default for field in fields(module.Options) if field.name not in shared}
     return {
         "name": module.name,
         "summary": module.summary,
         "faces": module.faces,
         "continuity": module.continuity,
         "normals": list(module.normals),
-        "options": {field.name: field.default for field in fields(module.Options) if field.default is not None},
+        "options": {**own, **{name: value for name, value in shared.items() if value is not None}},
         "source": module.source,
     }
 

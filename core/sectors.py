@@ -347,16 +347,16 @@ def end_normals(topology: Topology, normals: Floats, half_edges: Ints) -> Floats
 def _crease_tangents(along: Floats, left: Floats, right: Floats, mean: Floats, line: Floats) -> Floats:
     """Tangent ``(k,3)`` where two normals meet: their common perpendicular, towards the line or the edge.
 
-    Where the normals agree, as on a crease in a flat place, the line itself.
+    Where the normals agree, as on a crease in a flat place, the line itself, or the edge projected into their plane.
     """
     line = line * np.where(dot(line, along) < 0, -1.0, 1.0)
     has_line = line.any(axis=1, keepdims=True)
     guide = np.where(has_line, line, along)
     across = cross(left, right)
     turn = np.linalg.norm(across, axis=1, keepdims=True)
-    across = np.where(has_line & (turn < NO_TURN), line, unit(across))
-    tangent = across * np.where(dot(across, guide) < 0, -1.0, 1.0)
     projected = unit(along - dot(along, mean) * mean)
+    across = np.where(turn < NO_TURN, np.where(has_line, line, projected), unit(across))
+    tangent = across * np.where(dot(across, guide) < 0, -1.0, 1.0)
     return np.where(dot(tangent, along) < LEAST_ADVANCE, projected, tangent)
 
 

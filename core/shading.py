@@ -27,8 +27,8 @@ def weld_normals(patches: Patches) -> Patches:
     total = fields[:, patches.side_field[first[edges]]] + fields[:, patches.side_field[last[edges]]]
     own = np.moveaxis(fields[:, edges][..., [0, -1]], 0, -1)
     other = np.moveaxis(fields[:, patches.side_field[last[edges]]][..., [0, -1]], 0, -1)
-    opposed = np.asarray((dot(unit(own), unit(other)) < OPPOSITE).any(axis=(1, 2)))
-    fields[:, edges] = np.where(opposed[:, None], fields[:, edges], total)
+    agreement = dot(unit(own), unit(other)).min(axis=(1, 2))
+    fields[:, edges] = np.where((agreement < OPPOSITE)[:, None], fields[:, edges], total)
     normals = _vertex_normals(patches)
     return replaced(patches, fields=fields, side_field=topology.edge.copy(), normals=normals)
 

@@ -36,7 +36,7 @@ def test_the_file_fed_back_alone_gives_the_same_bytes(call, folder):
 def test_an_angle_alone_creases_a_cube(call, folder):
     result = call("marks", "cube.obj", "-", "--sharp-angle", "40", "-v")
     assert len(json.loads(result.out)["edges"]) == 12
-    assert "angle: 12 crease" in result.err
+    assert "angle: 12 creases" in result.err
     report = json.loads(call("refine", "cube.obj", "d.ply", "--sharp-angle", "40", "--report", "-").out)
     assert report["marks"] == {"angle": {"crease": 12}}
     assert report["counts"]["input"]["crease_edges"] == 12
