@@ -28,6 +28,8 @@ from curvify.words import count_of
 
 #: A corner of a patch must open by at least the angle with this sine (3 degrees).
 LEAST_CORNER_SINE = float(np.sin(np.radians(3.0)))
+#: Corners whose sine is below this in size do not open at all.
+FLAT_CORNER = 1e-9
 #: Rounds of making corners and of splitting folded faces.
 ROUNDS = 4
 #: Patches looked at together in the fold tests, and normal fields.
@@ -273,7 +275,7 @@ def _new_corners(work: Patchwork) -> Bools:
     base, features = work.coarse.topology, work.features
     line = features.sharp | ~base.interior[:, None]
     lines = np.bincount(base.edges[line], minlength=len(made))
-    made[work.topology.vertices[work.sines < -1e-9]] = True
+    made[work.topology.vertices[work.sines < -FLAT_CORNER]] = True
     return made & (lines >= 2) & ~features.corners
 
 
@@ -285,10 +287,10 @@ def _bad_corners(work: Patchwork, rule: FoldRule) -> tuple[Bools, Bools]:
     """
     topology, sines = work.topology, work.sines
     bad = sines <= LEAST_CORNER_SINE
-    flat = np.flatnonzero(np.abs(sines) < 1e-9)
+    flat = np.flatnonzero(np.abs(sines) < FLAT_CORNER)
     bad[flat[_straight_through(work, flat)]] = False
     folded = np.zeros(len(topology.offsets) - 1, dtype=bool)
-    folded[topology.faces[bad & (sines < 0)]] = True
+    folded[topology.faces[bad & (sines < FLAT_CORNER)]] = True
     unsure = np.ones(len(folded), dtype=bool)
     if rule.blended:
         unsure = np.bincount(topology.faces[~_surely_inward(work)], minlength=len(folded)) > 0

@@ -399,3 +399,44 @@ def test_marks_survive_welding_and_turn_with_the_mesh() -> None:
     assert got.patches.counts["crease_edges"] == 16
     assert np.array_equal(got.patches.normals, expected.patches.normals)
     assert diagonal(got.patches.positions) == diagonal(expected.patches.positions)
+
+
+def random_marks(mesh: PolygonMesh, generator: np.random.Generator) -> Marks:
+    """Marks of all kinds scattered over the mesh."""
+    edges = edges_of(mesh)
+
+    def some(count: int, share: float) -> np.ndarray:
+        return generator.choice(count, generator.integers(1, max(2, int(count * share))), replace=False)
+
+    sharp, bent, corners = some(len(edges), 0.3), some(len(edges), 0.1), some(mesh.vertex_count, 0.08)
+    sharpness = generator.random((len(sharp), 2))
+    sharpness[generator.random(sharpness.shape) < 0.5] = 1
+    bulged = some(mesh.face_count, 0.3)
+    return Marks(
+        crease_edges=edges[sharp],
+        crease_sharpness=sharpness,
+        straight_edges=edges[some(len(edges), 0.1)],
+        bent_edges=edges[bent],
+        edge_normals=generator.standard_normal((len(bent), 3)),
+        corner_vertices=corners,
+        corner_sharpness=generator.random(len(corners)),
+        flat_faces=some(mesh.face_count, 0.1),
+        hole_faces=some(mesh.face_count, 0.02),
+        bulged_faces=bulged,
+        bulges=generator.uniform(-0.3, 0.3, len(bulged)),
+    )
+
+
+@each_projected
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("make", [mixed_ball, icosahedron, vase, lambda: torus(9, 6), lambda: prism(9)])
+def test_marks_of_all_kinds_together_leave_a_sound_surface(make: object, seed: int, kind: str) -> None:
+    mesh = make()  # type: ignore[operator]
+    surface = curvify.surface(mesh, marks=random_marks(mesh, np.random.default_rng(seed)), cross_tangent=kind)
+    dense = surface.refine(2)
+    check_sound(dense)
+    check_sound(surface.weld_normals().refine(2))
+    found = edge_angles(surface.patches)
+    assert found.gaps.max() < 1e-13
+    if not surface.patches.counts["folded_patches"]:
+        assert found.angles[found.smooth].max() < 1e-9
