@@ -159,7 +159,7 @@ def knob_hard() -> Marked:
 def ball_darts() -> Marked:
     """Return three creases down the sides of the ball, which fade where they end."""
     marked = Marked("ball-darts", "ball", "three creases that fade where they end")
-    for k in (0, 2, 4):
+    for k in (1, 3, 5):
         marked.mark_edges(pairwise(6 * ring + k for ring in range(4)), crease=1)
     return marked
 

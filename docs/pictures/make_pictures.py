@@ -1,4 +1,4 @@
-"""Draw the pictures of the README: ``python docs/pictures/make_pictures.py [FOLDER]``, or ``make pictures``.
+"""Draw the pictures of the README and of the pages beside it: ``python docs/pictures/make_pictures.py [FOLDER]``, or ``make pictures``.
 
 They are written beside this file unless a folder is given. The same device gives the same bytes; another one may
 differ in a last bit here and there.
@@ -50,7 +50,40 @@ def reflections(device: Device) -> bytes:
     return to_png(picture(panels, settings, device))
 
 
-PICTURES = {"refined.png": refined, "reflections.png": reflections}
+def marked(name: str) -> Layer:
+    """A sample refined with the marks file of that name, which begins with the name of its mesh."""
+    marks = read_marks(SAMPLES / f"{name}.json")
+    return Layer(curvify.refine(sample(name.split("-")[0]), level=12, marks=marks))
+
+
+def rings(device: Device) -> bytes:
+    """One ring, six shapes, after figure 15 of the paper that the surface is from."""
+    texts = {
+        "ring-a-plain": "no marks",
+        "ring-b-flat": "flat above and below",
+        "ring-c-level": "edge normals",
+        "ring-d-cones": "creases, straight edges",
+        "ring-e-flat-creased": "flat, and a crease",
+        "ring-f-creased": "the crease alone",
+    }
+    panels = [Panel([marked(name)], text) for name, text in texts.items()]
+    return to_png(picture(panels, Settings(size=(240, 190), background=None), device))
+
+
+def features(device: Device) -> bytes:
+    """Smooth and sharp: the mushroom and the pawn, after figures 18 and 19; darts; a rim from soft to hard."""
+    panels = [
+        Panel([Layer(curvify.refine(sample("mushroom"), level=12))], "mushroom"),
+        Panel([marked("mushroom-sharp")], "with creases"),
+        Panel([Layer(curvify.refine(sample("pawn"), level=12))], "pawn"),
+        Panel([marked("pawn-sharp")], "with creases"),
+        Panel([marked("ball-darts")], "creases that fade"),
+        Panel([marked("cylinder-soft")], "a rim from soft to hard"),
+    ]
+    return to_png(picture(panels, Settings(size=(240, 240), background=None, fit="each"), device))
+
+
+PICTURES = {"refined.png": refined, "reflections.png": reflections, "rings.png": rings, "features.png": features}
 
 
 def main(folder: Path) -> None:
