@@ -110,7 +110,7 @@ def gather_marks(
         resolved.counts[name] = marks.counts()
         _take_creases(resolved.crease, decided, marks, topology, stand_in, lost)
         resolved.named |= decided & ~resolved.rims
-        rims = _flat_rims(topology, area, np.isin(loops.source_faces, marks.flat_faces)) & ~decided
+        rims = _flat_rims(topology, area, resolved.flat, np.isin(loops.source_faces, marks.flat_faces)) & ~decided
         _decide(resolved.crease, decided, rims, np.ones(2))
         resolved.rims |= rims
     notes = _note_lost(lost)
@@ -218,12 +218,12 @@ def _note_lost(lost: list[tuple[int, int]]) -> list[str]:
     return [f"{count_of(number, 'mark is', 'marks are')} on vertices that no edge joins, first: {a}-{b}; ignored"]
 
 
-def _flat_rims(topology: Topology, area: Floats, flat: Bools) -> Bools:
-    """Interior edges ``(E,)`` of flat faces, but for those between two that lie in one plane."""
+def _flat_rims(topology: Topology, area: Floats, flat: Bools, chosen: Bools) -> Bools:
+    """Interior edges ``(E,)`` of the faces ``chosen (F,)``, but for those between ``flat (F,)`` ones in one plane."""
     rims = np.zeros(len(topology.edges), dtype=bool)
-    if flat.any():
+    if chosen.any():
         faces = topology.faces
-        rims[topology.edge[flat[faces]]] = True
+        rims[topology.edge[chosen[faces]]] = True
         one = np.flatnonzero(topology.twin >= 0)
         other = topology.twin[one]
         both = flat[faces[one]] & flat[faces[other]]

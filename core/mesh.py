@@ -78,7 +78,17 @@ class Marks:
         return {name: len(items) for name, items in kinds.items() if len(items)}
 
     def validate(self, vertices: int, faces: int) -> None:
-        """Raise MeshError unless all marks lie on the mesh's vertices and faces and are in range."""
+        """Raise MeshError unless all marks lie on the mesh's vertices and faces and have values in range."""
+        for places, found, shape in (
+            (self.crease_edges, self.crease_sharpness, (2,)),
+            (self.bent_edges, self.edge_normals, (3,)),
+            (self.curled_edges, self.kappas, ()),
+            (self.corner_vertices, self.corner_sharpness, ()),
+            (self.bulged_faces, self.bulges, ()),
+            (self.full_faces, self.alphas, ()),
+        ):
+            if found.shape != (len(places), *shape):
+                raise MeshError(f"{len(places)} marks need values of shape {(len(places), *shape)}, not {found.shape}")
         edges = (self.crease_edges, self.straight_edges, self.bent_edges, self.curled_edges)
         ends = np.concatenate([*(pairs.reshape(-1) for pairs in edges), self.corner_vertices])
         inner = np.concatenate([self.flat_faces, self.hole_faces, self.bulged_faces, self.full_faces])

@@ -12,7 +12,7 @@ import numpy as np
 
 from curvify.edges import edge_curves
 from curvify.errors import MeshError
-from curvify.marks import ResolvedMarks, found_marks, gather_marks, hole_faces
+from curvify.marks import ResolvedMarks, explicit_marks, found_marks, gather_marks, hole_faces
 from curvify.mesh import Bools, Floats, Ints, Marks, PolygonMesh
 from curvify.normals import SAME_NORMAL, degrees_between, is_flat_shaded, unit
 from curvify.options import MeshOptions
@@ -130,8 +130,8 @@ def prepare_mesh(mesh: PolygonMesh, options: MeshOptions | None = None) -> Coars
     mesh.validate()
     positions = np.ascontiguousarray(mesh.positions, dtype=np.float64)
     _check_extent(positions, mesh)
-    if options.marks is not None:
-        options.marks.validate(mesh.vertex_count, mesh.face_count)
+    for marks in explicit_marks(mesh, options).values():
+        marks.validate(mesh.vertex_count, mesh.face_count)
     stand_in = weld_vertices(positions, mesh.face_offsets, mesh.face_vertices, options.weld)
     loops = clean_loops(mesh.face_offsets, stand_in[mesh.face_vertices])
     holes = hole_faces(mesh, options)
@@ -147,10 +147,10 @@ def prepare_mesh(mesh: PolygonMesh, options: MeshOptions | None = None) -> Coars
     topology = build_topology(positions, loops.offsets, loops.vertices)
     area = newell_normals(positions, loops.offsets, loops.vertices)
     given = _given_normals(mesh, loops, topology, area, options.sharp_from)
-    marks, notes = gather_marks(mesh, options, topology, loops, stand_in, area, given.normals)
+    resolved, notes = gather_marks(mesh, options, topology, loops, stand_in, area, given.normals)
     around = fans(topology)
-    sectors = label_sectors(topology, around, marks.crease)
-    coarse = Coarse(mesh, positions, stand_in, loops, topology, area, around, sectors, given.normals, marks, holes)
+    sectors = label_sectors(topology, around, resolved.crease)
+    coarse = Coarse(mesh, positions, stand_in, loops, topology, area, around, sectors, given.normals, resolved, holes)
     coarse.counts["hole_faces"] = int(holes.sum())
     coarse.warnings += mesh.warnings
     _note_topology(coarse, int((stand_in != np.arange(len(stand_in))).sum()), dropped)

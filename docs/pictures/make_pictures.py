@@ -1,7 +1,7 @@
-"""Draw the pictures of the README and of the pages beside it: ``python docs/pictures/make_pictures.py [FOLDER]``, or ``make pictures``.
+"""Draw the pictures of the README and the pages beside it: ``python docs/pictures/make_pictures.py [FOLDER]``.
 
-They are written beside this file unless a folder is given. The same device gives the same bytes; another one may
-differ in a last bit here and there.
+`make pictures` does the same. They are written beside this file unless a folder is given. The same device gives the
+same bytes; another one may differ in a last bit here and there.
 """
 
 from __future__ import annotations

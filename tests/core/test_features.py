@@ -278,15 +278,16 @@ def test_flat_faces_are_planar(kind: str) -> None:
     assert found.angles[found.smooth].max() < 1e-9
 
 
-def test_flat_faces_in_one_plane_are_smooth_between_them() -> None:
+@pytest.mark.parametrize("tagged", [0, 5, 9])
+def test_flat_faces_in_one_plane_are_smooth_between_them(tagged: int) -> None:
     mesh = torus(9, 4).with_(corner_normals=None)
     turn = np.pi / 4
     angle = np.repeat(2 * np.pi * np.arange(4) / 4 + turn, 9)
     around = np.tile(2 * np.pi * np.arange(9) / 9, 4)
     radius = 1 + 0.4 * np.cos(angle)
     points = np.stack([radius * np.cos(around), radius * np.sin(around), 0.4 * np.sin(angle)], axis=1)
-    mesh = mesh.with_(positions=points)
-    surface = curvify.surface(mesh, marks=Marks(flat_faces=np.arange(9)))
+    mesh = mesh.with_(positions=points, marks=Marks(flat_faces=np.arange(tagged)))
+    surface = curvify.surface(mesh, marks=Marks(flat_faces=np.arange(tagged, 9)))
     found = edge_angles(surface.patches)
     assert (~found.smooth).sum() == 18
     inside = (surface.patches.topology.edges[found.edges] % 9)[found.smooth]

@@ -196,6 +196,7 @@ def test_marks_that_lie_on_no_edge_are_told() -> None:
     [
         (creases([(0, 8)]), "vertex 8, the mesh has 8"),
         (creases([(0, 1)], 1.5), "from 0 to 1"),
+        (Marks(crease_edges=np.array([[0, 1]])), r"1 marks need values of shape \(1, 2\)"),
         (Marks(flat_faces=np.array([6])), "face 6, the mesh has 6"),
         (Marks(full_faces=np.array([0]), alphas=np.array([0.0])), "positive"),
         (Marks(bulged_faces=np.array([0]), bulges=np.array([np.nan])), "finite"),
@@ -204,6 +205,8 @@ def test_marks_that_lie_on_no_edge_are_told() -> None:
 def test_marks_that_cannot_be_are_refused(marks: Marks, text: str) -> None:
     with pytest.raises(curvify.MeshError, match=text):
         curvify.surface(cube(), marks=marks)
+    with pytest.raises(curvify.MeshError, match=text):
+        curvify.surface(cube().with_(marks=marks))
 
 
 @pytest.mark.parametrize(
