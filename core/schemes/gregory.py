@@ -83,7 +83,9 @@ def prepare(mesh: PolygonMesh, options: Options | None = None) -> Patches:
         points, sides = patch_sides(work, corners)
         if blended:  # their fullness does not change the side
             return ProjectedBlend(sides, options.cross_tangent, np.zeros(corners.shape))
-        return paper_tangent(sides, points, side_normals(work, corners), options.cross_tangent, np.ones(len(corners)))
+        patches = np.searchsorted(work.topology.offsets, corners[:, 0])
+        alpha = face_shapes(work, options).alpha[patches]
+        return paper_tangent(sides, points, side_normals(work, corners), options.cross_tangent, alpha)
 
     work = build_patchwork(coarse, options.tangent_lengths, options.split_rule, FoldRule(inward, blended))
     shape = face_shapes(work, options)

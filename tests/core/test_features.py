@@ -21,6 +21,7 @@ from surfaces import (
     flat_grid,
     icosahedron,
     mixed_ball,
+    noisy,
     octahedron,
     prism,
     refined,
@@ -356,6 +357,16 @@ def test_alpha_of_a_face() -> None:
     assert np.array_equal(got[others], plain.evaluate(faces, middle)[0][others])
     assert np.abs(got[1] - plain.evaluate(faces, middle)[0][1]).max() > 0.01
     assert edge_angles(one.patches).angles.max() < 1e-9
+
+
+def test_the_fold_test_knows_the_alpha_of_each_face() -> None:
+    mesh = noisy(mixed_ball(), 0.1)
+    full = curvify.surface(mesh, cross_tangent="quadratic", alpha=50.0)
+    assert full.patches.counts["folded_patches"] > 0
+    faces = np.arange(mesh.face_count)
+    marks = Marks(full_faces=faces, alphas=np.ones(len(faces)))
+    tamed = curvify.surface(mesh, cross_tangent="quadratic", alpha=50.0, marks=marks)
+    assert tamed.patches.counts["folded_patches"] == 0
 
 
 def test_bulges_that_the_cross_tangent_cannot_show_are_named() -> None:
