@@ -16,6 +16,8 @@ COMMANDS = {
     "split": "Cut concave and many-sided faces into convex ones.",
     "marks": "Write the sharp features of a mesh as a marks file.",
     "render": "Draw meshes side by side into a PNG picture.",
+    "info": "Show what a mesh is like and what refine would do with it.",
+    "check": "Check that a mesh is what it should be; the exit code tells.",
     "schemes": "List the surface schemes and their options.",
     "backends": "List what can evaluate surfaces: the processor, and the GPU that was found.",
 }

@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 import click
 
+from curvify import __version__
 from curvify.cli.group import Option
 from curvify.schemes import NAMES
 
@@ -43,6 +44,8 @@ in_and_out = with_options(
     click.argument("input", metavar="IN", type=click.Path(allow_dash=True)),
     click.argument("output", metavar="OUT", type=click.Path(allow_dash=True)),
 )
+
+only_in = click.argument("input", metavar="IN", type=click.Path(allow_dash=True))
 
 # --- surface ----------------------------------------------------------------------------------------------------
 
@@ -154,6 +157,7 @@ precision = option(
     help="Type of the numbers in OUT; 'input' is that of a PLY file, float32 for others.",
 )
 as_text = option(OUTPUT, "--ascii", "ascii", is_flag=True, help="Write PLY as text.")
+as_json = option(OUTPUT, "--json", "as_json", is_flag=True, help="Print JSON.")
 no_clobber = option(OUTPUT, "--no-clobber", is_flag=True, help="Fail if OUT exists already.")
 report = option(
     OUTPUT, "--report", metavar="FILE", help="Write measurements of the surface and the run as JSON; '-' for stdout."
@@ -192,3 +196,10 @@ dry_run = option(RUNNING, "--dry-run", is_flag=True, help="Say how large OUT wou
 quiet = option(MESSAGES, "-q", "--quiet", is_flag=True, help="No warnings and no progress bar, only errors.")
 verbose = option(MESSAGES, "-v", "--verbose", is_flag=True, help="Explain what was done and how long it took.")
 messages = with_options(quiet, verbose)
+
+
+def print_json(command: str, answer: dict[str, Any]) -> None:
+    """Print what a command found as JSON, with what made it and a version of its form."""
+    import json
+
+    click.echo(json.dumps({"schema": 1, "curvify": __version__, "command": command, **answer}, indent=2))

@@ -209,7 +209,7 @@ def _note_topology(coarse: Coarse, welded: int, dropped: Ints) -> None:
             f"{count_of(counts['nonmanifold_edges'], 'edge')} with more than two faces or with faces that run the same "
             f"way, first: {a}-{b}; each face treats them as a boundary"
         )
-    flat = np.flatnonzero(_without_area(coarse))
+    flat = np.flatnonzero(without_area(coarse))
     counts["zero_area_faces"] = len(flat)
     if len(flat):
         warnings.append(
@@ -221,7 +221,7 @@ def _note_topology(coarse: Coarse, welded: int, dropped: Ints) -> None:
         warnings.append("the mesh is closed and inside out: its faces run clockwise seen from outside")
 
 
-def _without_area(coarse: Coarse) -> Bools:
+def without_area(coarse: Coarse) -> Bools:
     """Faces ``(F,)`` whose area is nothing against the square of their longest side."""
     topology = coarse.topology
     points = coarse.positions[topology.vertices]

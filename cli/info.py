@@ -1,0 +1,77 @@
+"""`curvify info`: what a mesh is like, and what refine would do with it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from curvify.cli import options
+from curvify.cli.group import COMMANDS, Command
+from curvify.cli.surfaces import with_refine_options
+
+EXAMPLES = (
+    ("What is in this file, and would refine complain?", "curvify info coarse.obj"),
+    ("The same for a program", "curvify info coarse.obj --json"),
+    ("What would a finer surface take?", "curvify info coarse.obj --level 20"),
+)
+#: Refine is tried on meshes of up to this many faces: beyond, that would take longer than a look should.
+MOST_FACES = 500_000
+
+
+@with_refine_options(headings=(options.SURFACE, options.SHARP, options.MESH))
+@click.command(name="info", cls=Command, examples=EXAMPLES, short_help=COMMANDS["info"])
+@options.only_in
+@options.with_options(options.as_json, options.quiet)
+def command(**given: Any) -> None:
+    """Show what a mesh is like and what refine would do with it.
+
+    Counts, sizes, pieces, holes and genus, edges that join no two faces, how planar and convex the faces are, what the
+    file says beside the shape, and marks by their source. Then what refine would warn of, how many faces it would cut
+    and how many it would make, with the options given. Vertices, edges and faces are counted from 0.
+    """
+    info_file(**given)
+
+
+def info_file(input: str, input_format: str | None, as_json: bool, quiet: bool, **refine_options: Any) -> None:
+    """Read, look, print. Raises CurvifyError for a file that cannot be read."""
+    from curvify.cli import files
+    from curvify.errors import MeshError
+    from curvify.inspection import describe
+
+    files.check_input(input, input_format)
+    mesh = files.read_input(input, input_format)
+    name = files.shown_name(input, "stdin")
+    with files.naming(name, MeshError):
+        answer = describe(mesh, refine_options["weld"] or "auto")
+    answer = {"input": input, **answer, "refine": prediction(mesh, input, refine_options)}
+    if as_json:
+        options.print_json("info", answer)
+    else:
+        from curvify.cli.info_text import as_text
+
+        click.echo(as_text(name, answer, quiet))
+
+
+def prediction(mesh: Any, input: str, refine_options: dict[str, Any]) -> dict[str, Any]:
+    """What refine would do: counts and warnings, or the error that it would end with, or why it was not tried."""
+    from curvify.cli.surfaces import request_for
+    from curvify.errors import CurvifyError
+    from curvify.refinement import surface
+
+    request = request_for(input, refine_options)
+    asked = {"scheme": request.scheme, "level": request.level}
+    if mesh.face_count > MOST_FACES:
+        return {**asked, "not_tried": f"the mesh has more than {MOST_FACES:,} faces"}
+    try:
+        made = surface(mesh, request.scheme, **request.scheme_options)
+    except CurvifyError as error:
+        return {**asked, "error": str(error)}
+    split = {name: count for name, count in made.patches.counts.items() if name.endswith("_faces") and count}
+    return {
+        **asked,
+        "patches": len(made.sides),
+        "faces": made.face_count(request.level),
+        "cut_or_odd": split,
+        "warnings": made.warnings,
+    }

@@ -1,0 +1,57 @@
+"""Commands that make refine's surface on the way to something else: its options, and the surface they ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from curvify.cli.group import Option
+
+if TYPE_CHECKING:
+    from curvify.cli.run import Request
+
+
+def refine_parameters(leave_out: Iterable[str] = (), headings: Iterable[str] | None = None) -> list[Option]:
+    """Options of `refine`, those of some ``headings`` or all, without those named in ``leave_out``.
+
+    They are read from the command itself, so that an option that refine gains is one of every such command.
+    """
+    from curvify.cli.refine import command
+
+    options = [parameter for parameter in command.params if isinstance(parameter, Option)]
+    names = set(leave_out)
+    return [o for o in options if o.name not in names and (headings is None or o.heading in set(headings))]
+
+
+def with_refine_options(
+    leave_out: Iterable[str] = (), headings: Iterable[str] | None = None
+) -> Callable[[click.Command], click.Command]:
+    """Give a command options of `refine`, after its own."""
+
+    def decorate(command: click.Command) -> click.Command:
+        own = {parameter.name for parameter in command.params}
+        command.params += [o for o in refine_parameters(leave_out, headings) if o.name not in own]
+        return command
+
+    return decorate
+
+
+def refine_values(input: str, output: str, given: dict[str, Any]) -> dict[str, Any]:
+    """What `refine` would be called with: ``given`` where that has a value for an option, its default elsewhere."""
+    from curvify.cli.refine import command
+
+    context = click.Context(command, info_name="refine")
+    values = {
+        str(option.name): option.process_value(context, option.get_default(context)) for option in refine_parameters()
+    }
+    known = {name: value for name, value in given.items() if name in values}
+    return {**values, **known, "input": input, "output": output}
+
+
+def request_for(input: str, given: dict[str, Any]) -> Request:
+    """Refine's request for IN, with nowhere to write."""
+    from curvify.cli.run import Request
+
+    return Request(**refine_values(input, "-", given))
