@@ -75,6 +75,7 @@ def check_file(
 
     from curvify.checks import check_mesh
     from curvify.cli import files
+    from curvify.cli.console import as_line
     from curvify.errors import MeshError
 
     files.check_input(input, input_format)
@@ -88,20 +89,6 @@ def check_file(
         options.print_json("check", answer)
     elif not quiet:
         for finding in findings:
-            click.echo(as_line(name, finding))
+            click.echo(as_line(name, finding, finding.name.replace("_", "-")))
     if not passed:
         click.get_current_context().exit(1)
-
-
-def as_line(name: str, finding: Any) -> str:
-    """``cube.obj: watertight: no: 2 edges of one face only: 3-4, 4-7``."""
-    option = finding.name.replace("_", "-") + ("" if finding.limit is None else f" {finding.limit:g}")
-    if finding.name == "positive_volume":
-        option = "positive-volume"
-    answer = "yes" if finding.passed else "no"
-    line = ": ".join(part for part in (name, option, answer, finding.reason) if part)
-    if finding.passed or not finding.where:
-        return line
-    places = ", ".join(f"{place[0]}-{place[1]}" if finding.kind == "edge" else str(place) for place in finding.where)
-    more = ", ..." if finding.count > len(finding.where) else ""
-    return f"{line}: {finding.kind} {places}{more}"

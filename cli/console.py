@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import sys
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from curvify.cli.main import say
 from curvify.records import record
 from curvify.words import count_of
+
+if TYPE_CHECKING:
+    from curvify.findings import Finding
 
 #: Seconds of work before a progress bar appears.
 PATIENCE = 0.5
@@ -91,3 +94,16 @@ def size(number: int) -> str:
     while value >= 999.5 and len(units) > 1:
         value, units = value / 1000, units[1:]
     return f"{value:.3g} {units[0]}"
+
+
+def as_line(name: str, finding: Finding, condition: str) -> str:
+    """``cube.obj: watertight: no: 2 edges of one face only: edge 3-4, 4-7``."""
+    if finding.limit:
+        condition += f" {finding.limit:g}"
+    answer = "yes" if finding.passed else "no"
+    line = ": ".join(part for part in (name, condition, answer, finding.reason) if part)
+    if finding.passed or not finding.where:
+        return line
+    places = ", ".join(f"{place[0]}-{place[1]}" if finding.kind == "edge" else str(place) for place in finding.where)
+    more = ", ..." if finding.count > len(finding.where) else ""
+    return f"{line}: {finding.kind} {places}{more}"

@@ -18,6 +18,7 @@ COMMANDS = {
     "render": "Draw meshes side by side into a PNG picture.",
     "info": "Show what a mesh is like and what refine would do with it.",
     "check": "Check that a mesh is what it should be; the exit code tells.",
+    "compare": "Compare two meshes; the exit code tells whether they agree.",
     "schemes": "List the surface schemes and their options.",
     "backends": "List what can evaluate surfaces: the processor, and the GPU that was found.",
 }

@@ -7,43 +7,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from curvify import inspection
 from curvify.errors import OptionError
+from curvify.findings import MOST_PLACES, Finding, first_ids, worst_first
 from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.prepare import Coarse, prepare_mesh
 from curvify.words import count_of
-
-#: How many places a finding lists.
-MOST_PLACES = 10
-
-
-@dataclass(frozen=True)
-class Finding:
-    """The answer for one condition.
-
-    ``reason`` says in words what is wrong, or what was measured; ``limit`` is what was asked for and ``measured`` the
-    value that was compared with it, None where there is no number; ``count`` how many places fail. ``where`` lists the
-    first of them, the worst first where there is a worst: vertices and faces as numbers, edges as pairs of vertices,
-    all as in the file, counted from 0. ``kind`` is what these are: vertex, edge or face; empty for the whole mesh.
-    """
-
-    name: str
-    passed: bool
-    reason: str
-    limit: float | None = None
-    measured: float | None = None
-    count: int = 0
-    kind: str = ""
-    where: tuple[Any, ...] = ()
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return asdict(self)
 
 
 def check_mesh(mesh: PolygonMesh, conditions: Mapping[str, float | bool], weld: str = "auto") -> list[Finding]:
@@ -74,25 +47,21 @@ def _edges(coarse: Coarse, name: str, kinds: list[tuple[Ints, str]]) -> Finding:
 def _ids(name: str, kind: str, ids: Ints, one: str, many: str) -> Finding:
     """Fails where there are any faces or vertices of a bad kind."""
     reason = count_of(len(ids), one, many) if len(ids) else ""
-    return Finding(name, not len(ids), reason, count=len(ids), kind=kind, where=_plain(ids))
+    return Finding(name, not len(ids), reason, count=len(ids), kind=kind, where=first_ids(ids))
 
 
 def _largest(name: str, kind: str, values: Floats, places: Any, limit: float, unit: str) -> Finding:
     """Fails where any of the ``values`` exceeds the limit; ``places`` names each value."""
-    over = np.flatnonzero(values > limit)
-    worst = over[np.argsort(-values[over], kind="stable")][:MOST_PLACES]
+    worst = worst_first(values, values > limit)
     largest = float(values.max(initial=0.0))
-    many = f" in {count_of(len(over), kind)}" if len(over) else ""
+    many = f" in {count_of(len(worst), kind)}" if len(worst) else ""
     reason = f"up to {largest:.3g} {unit}{many}"
-    return Finding(name, not len(over), reason, limit, largest, len(over), kind, tuple(places(worst)))
+    where = tuple(places(worst[:MOST_PLACES]))
+    return Finding(name, not len(worst), reason, limit, largest, len(worst), kind, where)
 
 
 def _at_most(name: str, number: int, limit: float, what: str) -> Finding:
     return Finding(name, number <= limit, count_of(number, what), limit, number)
-
-
-def _plain(ids: Ints) -> tuple[int, ...]:
-    return tuple(int(i) for i in ids[:MOST_PLACES])
 
 
 # --- the conditions -----------------------------------------------------------------------------------------------
@@ -151,7 +120,7 @@ def _convex(coarse: Coarse, _: float) -> Finding:
 
 def _planar(coarse: Coarse, limit: float) -> Finding:
     source = coarse.loops.source_faces
-    return _largest("planar", "face", inspection.tilts(coarse), lambda rows: _plain(source[rows]), limit, "degrees")
+    return _largest("planar", "face", inspection.tilts(coarse), lambda rows: first_ids(source[rows]), limit, "degrees")
 
 
 def _g1(coarse: Coarse, limit: float) -> Finding:
@@ -165,7 +134,7 @@ def _g1(coarse: Coarse, limit: float) -> Finding:
 
 def _max_sides(coarse: Coarse, limit: float) -> Finding:
     sizes = coarse.mesh.face_sizes
-    return _largest("max_sides", "face", sizes.astype(np.float64), _plain, limit, "sides")
+    return _largest("max_sides", "face", sizes.astype(np.float64), first_ids, limit, "sides")
 
 
 def _max_faces(coarse: Coarse, limit: float) -> Finding:

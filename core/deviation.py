@@ -1,0 +1,185 @@
+"""How far surfaces are apart: nearest points, samples spread over a mesh, the sampled Hausdorff distance.
+
+Nearest points come from libigl: on 190,000 triangles and 50,000 points it took 0.7 s where pymeshlab took 0.8 s (in
+float32, 280 MB installed) and trimesh with rtree 5.3 s. Distances are in units of the file, angles in degrees.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from curvify.errors import MeshError
+from curvify.formats.others import triangulate
+from curvify.mesh import Floats, Ints, PolygonMesh
+from curvify.normals import degrees_between
+
+SAMPLES = 100_000
+
+
+@dataclass(eq=False)
+class Triangles:
+    """A mesh cut into triangles: ``positions (V,3)``, ``corners (T,3)`` of the mesh and their ``vertices (T,3)``."""
+
+    mesh: PolygonMesh
+    positions: Floats
+    corners: Ints
+    vertices: Ints
+
+    def normals(self, triangles: Ints, weights: Floats, smooth: bool) -> Floats:
+        """Normals ``(n,3)`` at barycentric ``weights (n,3)`` of triangles: of the file (``smooth``) or of the plane."""
+        if smooth and self.mesh.corner_normals is not None:
+            return np.einsum("nk,nki->ni", weights, self.mesh.corner_normals[self.corners[triangles]])
+        a, b, c = np.moveaxis(self.positions[self.vertices[triangles]], 1, 0)
+        return np.cross(b - a, c - a)
+
+    @property
+    def has_normals(self) -> bool:
+        """Whether the file gives every corner a normal."""
+        return self.mesh.corner_normals is not None and not np.isnan(self.mesh.corner_normals).any()
+
+
+def as_triangles(mesh: PolygonMesh) -> Triangles:
+    """The triangles of a mesh that have an area. Raises MeshError where there are none."""
+    corners = triangulate(mesh)
+    vertices = mesh.face_vertices[corners]
+    a, b, c = np.moveaxis(mesh.positions[vertices], 1, 0)
+    sized = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0
+    if not sized.any():
+        raise MeshError("the mesh has no face with an area; there is no surface to measure from")
+    return Triangles(mesh, mesh.positions, corners[sized], vertices[sized])
+
+
+def nearest(points: Floats, surface: Triangles) -> tuple[Floats, Ints, Floats]:
+    """Distance ``(n,)`` of points from a surface, the nearest triangle ``(n,)`` and the place there ``(n,3)``."""
+    import igl
+
+    square, triangle, place = igl.point_mesh_squared_distance(
+        np.ascontiguousarray(points, dtype=np.float64), surface.positions, surface.vertices
+    )[:3]
+    return np.sqrt(square), triangle, place
+
+
+def spread(surface: Triangles, count: int) -> tuple[Ints, Floats]:
+    """``count`` points spread evenly by area: triangle ``(n,)`` and barycentric weights ``(n,3)`` of each.
+
+    Always the same ones: triangles at equal steps of the summed area, places in them by the plastic number's sequence
+    (M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018).
+    """
+    a, b, c = np.moveaxis(surface.positions[surface.vertices], 1, 0)
+    total = np.cumsum(np.linalg.norm(np.cross(b - a, c - a), axis=1))
+    triangles = np.searchsorted(total, (np.arange(count) + 0.5) / count * total[-1])
+    plastic = 1.32471795724474602596
+    u, v = np.mod(np.arange(1, count + 1)[:, None] / np.array([plastic, plastic**2]), 1).T
+    over = u + v > 1
+    u, v = np.where(over, 1 - u, u), np.where(over, 1 - v, v)
+    return np.minimum(triangles, len(total) - 1), np.stack([1 - u - v, u, v], axis=1)
+
+
+@dataclass(frozen=True)
+class Apart:
+    """How far surface A is from surface B, sampled.
+
+    ``hausdorff`` the largest distance, either way; ``at`` where on A or B it is; ``rms`` and ``mean`` over the area of
+    both; ``normal_most`` the angle that 99 of 100 samples keep, ``normal_mean`` the mean one. Samples at creases can
+    find the wrong side, and one in a hundred allows for them. ``samples`` how many points were measured.
+    """
+
+    hausdorff: float
+    at: tuple[float, float, float]
+    rms: float
+    mean: float
+    normal_most: float
+    normal_mean: float
+    samples: int
+
+    def as_dict(self) -> dict[str, object]:
+        """Plain data for JSON."""
+        return asdict(self)
+
+
+def surfaces_apart(a: PolygonMesh, b: PolygonMesh, samples: int = SAMPLES) -> Apart:
+    """Measure from A to B and from B to A at ``samples`` points spread by area and as many vertices at most.
+
+    Normals are those of the files where both have them for every corner, else those of the triangles.
+    Raises MeshError for a mesh without a face that has an area.
+    """
+    one, other = as_triangles(a), as_triangles(b)
+    smooth = one.has_normals and other.has_normals
+    distances, angles, tops = [], [], []
+    for source, target in ((one, other), (other, one)):
+        triangles, weights = spread(source, samples)
+        points = np.einsum("nk,nki->ni", weights, source.positions[source.vertices[triangles]])
+        far, hit, place = nearest(points, target)
+        here = source.normals(triangles, weights, smooth)
+        there = target.normals(hit, _weights(target, hit, place), smooth)
+        vertices = _some(source.vertices.reshape(-1), samples)
+        corner_far = nearest(source.positions[vertices], target)[0]
+        all_far = np.concatenate([far, corner_far])
+        worst = int(all_far.argmax())
+        spot = points[worst] if worst < len(points) else source.positions[vertices[worst - len(points)]]
+        tops.append((float(all_far[worst]), spot, len(all_far)))
+        distances.append(far)
+        angles.append(degrees_between(here, there))
+    top = max(tops, key=lambda found: found[0])
+    far, angle = np.concatenate(distances), np.concatenate(angles)
+    return Apart(
+        hausdorff=top[0],
+        at=tuple(float(x) for x in top[1]),  # type: ignore[arg-type]
+        rms=float(np.sqrt(np.mean(far**2))),
+        mean=float(far.mean()),
+        normal_most=float(np.quantile(angle, 0.99)),
+        normal_mean=float(angle.mean()),
+        samples=sum(found[2] for found in tops),
+    )
+
+
+def _some(vertices: Ints, most: int) -> Ints:
+    """Distinct vertices, ``most`` of them at equal steps where there are more."""
+    used = np.flatnonzero(np.bincount(vertices))
+    return used if len(used) <= most else used[np.linspace(0, len(used) - 1, most).astype(np.int64)]
+
+
+def _weights(surface: Triangles, triangles: Ints, places: Floats) -> Floats:
+    """Barycentric weights ``(n,3)`` of places in triangles."""
+    a, b, c = np.moveaxis(surface.positions[surface.vertices[triangles]], 1, 0)
+    normal = np.cross(b - a, c - a)
+    square = np.einsum("ni,ni->n", normal, normal)
+    v = np.einsum("ni,ni->n", np.cross(places - a, c - a), normal) / square
+    w = np.einsum("ni,ni->n", np.cross(b - a, places - a), normal) / square
+    return np.stack([1 - v - w, v, w], axis=1)
+
+
+def same_topology(a: PolygonMesh, b: PolygonMesh) -> bool:
+    """Whether two meshes have the same faces on as many vertices."""
+    return (
+        a.vertex_count == b.vertex_count
+        and np.array_equal(a.face_offsets, b.face_offsets)
+        and np.array_equal(a.face_vertices, b.face_vertices)
+    )
+
+
+def deviations(mesh: PolygonMesh, reference: PolygonMesh, surface: bool = False) -> Floats:
+    """How far each vertex ``(V,)`` of a mesh is from the reference.
+
+    From the same vertex where both have the same topology, unless ``surface``; else from the reference's surface.
+    Raises MeshError for a reference without a face that has an area.
+    """
+    if same_topology(mesh, reference) and not surface:
+        return np.linalg.norm(mesh.positions - reference.positions, axis=1)
+    return nearest(mesh.positions, as_triangles(reference))[0]
+
+
+#: Colors of deviations from none to the largest: dark to light all along, so that they work in gray too.
+HEAT = np.array([(24, 16, 80), (70, 30, 140), (160, 40, 130), (225, 85, 75), (250, 160, 50), (255, 245, 170)])
+
+
+def heat_map(mesh: PolygonMesh, values: Floats, most: float) -> PolygonMesh:
+    """The mesh with vertex colors that show ``values (V,)``, from 0 to ``most``; larger ones have the last color."""
+    place = np.clip(values / most if most > 0 else np.zeros_like(values), 0, 1) * (len(HEAT) - 1)
+    steps = np.arange(len(HEAT))
+    colors = np.stack([np.interp(place, steps, HEAT[:, channel]) for channel in range(3)], axis=1)
+    return mesh.with_(vertex_colors=np.rint(colors).astype(np.uint8))
+
+
