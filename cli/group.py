@@ -19,6 +19,8 @@ COMMANDS = {
     "info": "Show what a mesh is like and what refine would do with it.",
     "check": "Check that a mesh is what it should be; the exit code tells.",
     "compare": "Compare two meshes; the exit code tells whether they agree.",
+    "curves": "Write the curves of a surface: edges, rims, silhouettes, cells.",
+    "batch": "Refine many meshes in parallel.",
     "schemes": "List the surface schemes and their options.",
     "backends": "List what can evaluate surfaces: the processor, and the GPU that was found.",
 }

@@ -148,7 +148,7 @@ def explain(error: BaseException) -> int:
     if isinstance(error, Stopped):
         say("curvify: stopped by a signal")
         return 128 + error.number
-    text, known = _text_of(error)
+    text, known = text_of(error)
     if known:
         say(f"curvify: error: {text}")
     else:
@@ -156,7 +156,7 @@ def explain(error: BaseException) -> int:
     return 2
 
 
-def _text_of(error: BaseException) -> tuple[str, bool]:
+def text_of(error: BaseException) -> tuple[str, bool]:
     """What to say about an error, and whether it is one that the user can mend."""
     from click import ClickException
 

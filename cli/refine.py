@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from curvify.cli import options
 from curvify.cli.group import COMMANDS, Command
+
+if TYPE_CHECKING:
+    from curvify.cli.run import Run
 
 EXAMPLES = (
     ("A smooth surface through the vertices of coarse.obj", "curvify refine coarse.obj dense.ply"),
@@ -49,7 +52,7 @@ EXAMPLES = (
     options.dry_run,
     options.messages,
 )
-def command(**given: Any) -> None:
+def command(**given: Any) -> Run:
     """Turn a coarse polygon mesh into a dense mesh of a smooth surface.
 
     The surface passes exactly through the vertices of IN. The suffixes of IN and OUT tell their formats (OBJ, PLY, OFF,
@@ -58,4 +61,4 @@ def command(**given: Any) -> None:
     """
     from curvify.cli.run import Request, refine_file
 
-    refine_file(Request(**given))
+    return refine_file(Request(**given))

@@ -129,8 +129,8 @@ class Run:
         }
 
 
-def refine_file(request: Request) -> None:
-    """Do what the command line asks for. Raises CurvifyError."""
+def refine_file(request: Request) -> Run:
+    """Do what the command line asks for; what came of it. Raises CurvifyError."""
     console = Console(request.quiet, request.verbose)
     options, format = check(request)
     keep_memory()
@@ -150,6 +150,7 @@ def refine_file(request: Request) -> None:
         _tell_prediction(run, console)
     else:
         _refine(run, console)
+    return run
 
 
 def read_marks(path: str) -> Marks:

@@ -42,10 +42,7 @@ def refine_values(input: str, output: str, given: dict[str, Any]) -> dict[str, A
     """What `refine` would be called with: ``given`` where that has a value for an option, its default elsewhere."""
     from curvify.cli.refine import command
 
-    context = click.Context(command, info_name="refine")
-    values = {
-        str(option.name): option.process_value(context, option.get_default(context)) for option in refine_parameters()
-    }
+    values = command.make_context("refine", ["IN", "OUT"]).params
     known = {name: value for name, value in given.items() if name in values}
     return {**values, **known, "input": input, "output": output}
 

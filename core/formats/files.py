@@ -103,11 +103,52 @@ def _open_beside(name: str) -> tuple[BinaryIO, str, str]:
     if not name or name.endswith("/"):
         raise IsADirectoryError(errno.EISDIR, "is a directory", name)
     target = os.path.realpath(name)
-    temporary = os.path.join(os.path.dirname(target), f".curvify-{os.urandom(6).hex()}.part")
-    descriptor = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    while True:
+        temporary = os.path.join(os.path.dirname(target), f".curvify-{os.urandom(6).hex()}.part")
+        descriptor = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+        if _lock(descriptor) and os.path.exists(temporary):
+            break
+        os.close(descriptor)  # someone who cleans up was faster
     with suppress(OSError):
         os.chmod(temporary, stat.S_IMODE(os.stat(target).st_mode))
     return os.fdopen(descriptor, "w+b"), temporary, target
+
+
+def _lock(descriptor: int) -> bool:
+    """Lock an open file against ``remove_leftovers`` until it is closed or its process ends, however that ends.
+
+    False where another process holds the lock. Where the system has no such locks, everything counts as locked by us:
+    Windows does not let go of files that are open anyway.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        return True
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks
+        return True
+    return True
+
+
+def remove_leftovers(folder: Path) -> int:
+    """Remove the temporary files that killed processes have left in a folder; how many there were.
+
+    Those that a living process still writes are locked and stay.
+    """
+    removed = 0
+    for path in folder.glob(".curvify-*.part"):
+        with suppress(OSError):
+            descriptor = os.open(path, os.O_RDWR)
+            try:
+                if _lock(descriptor):
+                    path.unlink()
+                    removed += 1
+            finally:
+                os.close(descriptor)
+    return removed
 
 
 def clean_name(name: str) -> str:
