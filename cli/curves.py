@@ -1,0 +1,119 @@
+"""`curvify curves`: lines on the surface, for drawings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from curvify.cli import options
+from curvify.cli.group import COMMANDS, Command
+from curvify.cli.surfaces import with_refine_options
+
+if TYPE_CHECKING:
+    from curvify.curves import Segments
+
+EXAMPLES = (
+    ("Edges and silhouette for a drawing", "curvify curves coarse.obj lines.obj --view 1 -2 1"),
+    ("The grid of every patch", "curvify curves coarse.obj grid.obj --cells --level 4"),
+)
+KIND = "Curves"
+
+
+@with_refine_options(headings=(options.SURFACE, options.SHARP, options.MESH))
+@click.command(name="curves", cls=Command, examples=EXAMPLES, short_help=COMMANDS["curves"])
+@options.in_and_out
+@options.with_options(
+    options.option(KIND, "--edges", is_flag=True, help="Curves over the edges of IN."),
+    options.option(KIND, "--rims", is_flag=True, help="Boundaries of the surface only."),
+    options.option(KIND, "--silhouette", is_flag=True, help="Where the surface turns away from the viewer."),
+    options.option(KIND, "--cells", is_flag=True, help="The grid of every patch: the sides of all cells."),
+    options.option(
+        KIND,
+        "--view",
+        nargs=3,
+        type=float,
+        default=(1.0, 1.0, 1.0),
+        show_default=True,
+        metavar="X Y Z",
+        help="Direction from the mesh to the viewer of --silhouette, who is far away.",
+    ),
+    options.no_clobber,
+    options.messages,
+)
+def command(**given: Any) -> None:
+    """Write the curves of a surface as lines of an OBJ file: edges, rims, silhouettes, cells.
+
+    Without a choice, edges and the silhouette. Each kind is an object of its name. OUT is an OBJ file, '-' standard
+    output. The level sets how finely curves are cut: 2 K segments for each edge.
+    """
+    curves_file(**given)
+
+
+def curves_file(
+    input: str,
+    output: str,
+    edges: bool,
+    rims: bool,
+    silhouette: bool,
+    cells: bool,
+    view: tuple[float, float, float],
+    input_format: str | None,
+    no_clobber: bool,
+    quiet: bool,
+    verbose: bool,
+    **refine_options: Any,
+) -> None:
+    """Read, refine, find the curves, write them. Raises CurvifyError."""
+    from curvify.cli import files
+    from curvify.cli.console import Console
+    from curvify.cli.surfaces import request_for
+    from curvify.curves import chained, curves
+    from curvify.errors import FormatError, MeshError
+    from curvify.refinement import surface
+    from curvify.words import count_of
+
+    console = Console(quiet, verbose)
+    if output != files.STREAM:
+        files.check_output(output, None, no_clobber)
+        if not output.lower().endswith(".obj"):
+            raise FormatError(f"{output}: curves are written as OBJ only; give a name that ends in .obj")
+    files.check_input(input, input_format)
+    mesh = files.read_input(input, input_format)
+    name = files.shown_name(input, "stdin")
+    request = request_for(input, refine_options)
+    with files.naming(name, MeshError):
+        made = surface(mesh, request.scheme, **request.scheme_options)
+    for text in made.warnings:
+        console.warn(f"{name}: {text}")
+    dense = made.refine(request.level, max_faces=request.max_faces)
+    asked = {"edges": edges, "rims": rims, "silhouette": silhouette, "cells": cells}
+    kinds = [kind for kind, wanted in asked.items() if wanted] or ["edges", "silhouette"]
+    found = {kind: curves(dense, kind, view) for kind in kinds}
+    lines = {kind: segments.ends.tolist() if kind == "cells" else chained(segments) for kind, segments in found.items()}
+    write_lines(output, found, lines)
+    told = ", ".join(f"{count_of(len(lines[kind]), 'line')} of {kind}" for kind in kinds)
+    console.explain(f"{files.shown_name(output, 'stdout')}: {told}")
+
+
+def write_lines(path: str, found: dict[str, Segments], lines: dict[str, list[list[int]]]) -> None:
+    """Polylines as OBJ, an object for each kind, with the points that they use."""
+    import sys
+
+    from curvify.formats import atomic_file
+
+    text, count = [], 0
+    for kind, segments in found.items():
+        numbers: dict[int, int] = {}
+        for line in lines[kind]:
+            for point in line:
+                numbers.setdefault(point, count + len(numbers) + 1)
+        count += len(numbers)
+        text.append(f"o {kind}\n")
+        text += [f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in segments.points[list(numbers)].tolist()]
+        text += ["l " + " ".join(str(numbers[point]) for point in line) + "\n" for line in lines[kind]]
+    if path == "-":
+        sys.stdout.write("".join(text))
+        return
+    with atomic_file(path) as out:
+        out.write("".join(text).encode())
