@@ -13,6 +13,7 @@ from curvify import __version__
 #: Every command, with the line that `curvify --help` shows; the command is ``command`` in the module of its name.
 COMMANDS = {
     "refine": "Turn a coarse polygon mesh into a dense mesh of a smooth surface.",
+    "repair": "Mend what refine only warns of.",
     "split": "Cut concave and many-sided faces into convex ones.",
     "marks": "Write the sharp features of a mesh as a marks file.",
     "render": "Draw meshes side by side into a PNG picture.",

@@ -80,17 +80,24 @@ def degenerate_faces(coarse: Coarse) -> Ints:
     return np.flatnonzero(~kept)
 
 
-def repeated_loops(loops: Loops) -> Bools:
-    """Loops ``(F,)`` that have the same vertices as an earlier one, in any order."""
+def same_loops(loops: Loops) -> Ints:
+    """The first loop ``(F,)`` that has the same vertices as each one, in any order: itself for most."""
     sizes = np.diff(loops.offsets)
-    repeated = np.zeros(len(sizes), dtype=bool)
+    first = np.arange(len(sizes))
     for size in values_of(sizes):
         rows = np.flatnonzero(sizes == size)
         corners = np.sort(loops.vertices[loops.offsets[rows][:, None] + np.arange(size)], axis=1)
         order = np.lexsort(corners.T)
-        same = (corners[order][1:] == corners[order][:-1]).all(axis=1)
-        repeated[rows[order[1:][same]]] = True
-    return repeated
+        fresh = np.ones(len(rows), dtype=bool)
+        fresh[1:] = (corners[order][1:] != corners[order][:-1]).any(axis=1)
+        first[rows[order]] = rows[order[fresh]][np.cumsum(fresh) - 1]
+    return first
+
+
+def repeated_loops(loops: Loops) -> Bools:
+    """Loops ``(F,)`` that have the same vertices as an earlier one, in any order."""
+    first = same_loops(loops)
+    return first != np.arange(len(first))
 
 
 def concave_faces(coarse: Coarse) -> Ints:
