@@ -56,7 +56,7 @@ def condition(name: str, help: str, type: Any = None, metavar: str | None = None
     options.quiet,
 )
 def command(**given: Any) -> None:
-    """Check that a mesh is what it should be.
+    """Check that a mesh is what it should be; the exit code tells.
 
     The exit code is 0 if IN meets all conditions, 1 if it does not, 2 if it cannot be read. One line for each
     condition says why and where: vertices, edges and faces are counted from 0. Seams are closed before anything is

@@ -91,12 +91,13 @@ class Length(click.ParamType):
     options.quiet,
 )
 def command(**given: Any) -> None:
-    """Compare mesh B with mesh A: the exit code is 0 if they agree, 1 if they do not.
+    """Compare two meshes; the exit code tells whether they agree.
 
-    Without --surface the faces must be the same, and positions, normals, texture coordinates, colors, materials and
-    groups are compared vertex by vertex; the worst is named. With --surface the faces do not matter: distances are
-    measured between the surfaces, both ways, and compared with the tolerances that are given; without any, the answer
-    is the measurements and the exit code 0. Vertices and faces are counted from 0.
+    It is 0 if B agrees with A, 1 if it does not. Without --surface the faces must be the same, and positions, normals,
+    texture coordinates, colors, materials and groups are compared vertex by vertex; the worst is named. With --surface
+    the faces do not matter: distances are measured between the surfaces, both ways, and compared with the tolerances
+    that are given; without any, the answer is the measurements and the exit code 0. Vertices and faces are counted
+    from 0.
     """
     compare_files(**given)
 

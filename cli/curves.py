@@ -42,10 +42,10 @@ KIND = "Curves"
     options.messages,
 )
 def command(**given: Any) -> None:
-    """Write the curves of a surface as lines of an OBJ file: edges, rims, silhouettes, cells.
+    """Write the curves of a surface: edges, rims, silhouettes, cells.
 
-    Without a choice, edges and the silhouette. Each kind is an object of its name. OUT is an OBJ file, '-' standard
-    output. The level sets how finely curves are cut: 2 K segments for each edge.
+    They are lines in an OBJ file. Without a choice, edges and the silhouette. Each kind is an object of its name. OUT
+    is an OBJ file, '-' standard output. The level sets how finely curves are cut: 2 K segments for each edge.
     """
     curves_file(**given)
 

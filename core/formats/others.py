@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -11,20 +12,24 @@ from numpy.typing import NDArray
 
 from curvify.errors import FormatError
 from curvify.formats.obj_write import round_to
-from curvify.formats.wedges import split_vertices, wedge_rows
+from curvify.formats.references import referenced_files
+from curvify.formats.wedges import Wedges, split_vertices, wedge_rows
 from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.records import record
 
 
 @record
 class _Part:
-    """One triangle mesh of a scene, in its place: ``faces (F,3)``, the others one row for each vertex."""
+    """One triangle mesh of a scene, in its place: ``faces (F,3)``, the others one row for each vertex; the name of
+    its ``material``, empty where it has none.
+    """
 
     positions: Floats
     faces: Ints
     normals: Floats | None
     uvs: Floats | None
     colors: NDArray[np.generic] | None
+    material: str
 
 
 def _import_trimesh() -> Any:
@@ -39,12 +44,16 @@ def read_other(data: bytes, name: str, format: str) -> PolygonMesh:
     """Parse a file of a format that it reads into a triangle mesh.
 
     All parts of a scene are put together, transformed. Vertices stay as the file has them, not merged.
-    Normals, uvs and vertex colors are kept where every part has them.
+    Normals, uvs and vertex colors are kept where every part has them, materials by their names.
     Raises FormatError for whatever trimesh cannot read.
     """
+    missing = [path for path in referenced_files(name) if not Path(path).is_file()]
+    if missing:
+        raise FormatError(f"{name}: it refers to {missing[0]}, and there is no such file")
     trimesh = _import_trimesh()
     try:
-        parts = _parts(trimesh.load(io.BytesIO(data), file_type=format, process=False), trimesh)
+        loaded = trimesh.load(io.BytesIO(data), file_type=format, process=False, **_neighbors(name, format, trimesh))
+        parts = _parts(loaded, trimesh)
     except ImportError as error:
         raise FormatError(f"{name}: reading {format} needs another package: {_one_line(error)}") from None
     except Exception as error:
@@ -52,6 +61,13 @@ def read_other(data: bytes, name: str, format: str) -> PolygonMesh:
     if not parts:
         raise FormatError(f"{name}: the file holds no triangles")
     return _join(parts, name)
+
+
+def _neighbors(name: str, format: str, trimesh: Any) -> dict[str, Any]:
+    """Where the files that a glTF file refers to are looked for: beside it."""
+    if format != "gltf" or not Path(name).is_file():
+        return {}
+    return {"resolver": trimesh.resolvers.FilePathResolver(name)}
 
 
 def _one_line(error: Exception) -> str:
@@ -64,8 +80,12 @@ def _parts(loaded: Any, trimesh: Any) -> list[_Part]:
     if not isinstance(loaded, trimesh.Scene):
         placed = [(np.eye(4), loaded)]
     else:
-        nodes = [loaded.graph[node] for node in loaded.graph.nodes_geometry]
-        placed = [(np.asarray(matrix), loaded.geometry[key]) for matrix, key in nodes]
+        order = {key: number for number, key in enumerate(loaded.geometry)}  # that of the file
+        nodes = [(order[loaded.graph[node][1]], node) for node in loaded.graph.nodes_geometry]
+        placed = []
+        for _, node in sorted(nodes):
+            matrix, key = loaded.graph[node]
+            placed.append((np.asarray(matrix), loaded.geometry[key]))
     return [_place(m, g) for m, g in placed if isinstance(g, trimesh.Trimesh) and len(g.faces)]
 
 
@@ -80,9 +100,9 @@ def _place(matrix: Floats, geometry: Any) -> _Part:
             normals = _unit(normals @ np.linalg.pinv(linear))
     if np.linalg.det(linear) < 0:
         faces = faces[:, ::-1]
-    kind = getattr(geometry.visual, "kind", None)
-    colors = np.asarray(geometry.visual.vertex_colors, dtype=np.uint8) if kind == "vertex" else None
-    return _Part(positions, faces, normals, _stored_uvs(geometry), colors)
+    material = getattr(geometry.visual, "material", None)
+    name = str(getattr(material, "name", None) or "")
+    return _Part(positions, faces, normals, _stored_uvs(geometry), _stored_colors(geometry), name)
 
 
 def _unit(rows: Floats) -> Floats:
@@ -117,7 +137,18 @@ def _join(parts: list[_Part], name: str) -> PolygonMesh:
         corner_uvs=None if uvs is None else uvs[corners],
         vertex_colors=_stack([part.colors for part in parts]),
         position_dtype=np.dtype(np.float32),
+        **_joined_materials(parts),
     )
+
+
+def _joined_materials(parts: list[_Part]) -> dict[str, Any]:
+    """Materials of the faces of all parts, and their names in the order that they come."""
+    names = tuple(dict.fromkeys(part.material for part in parts if part.material))
+    if not names:
+        return {}
+    numbers = {name: number for number, name in enumerate(names)} | {"": -1}
+    materials = [np.full(len(part.faces), numbers[part.material], dtype=np.int64) for part in parts]
+    return {"face_materials": np.concatenate(materials), "material_names": names}
 
 
 def _stack(arrays: list[Any]) -> Any:
@@ -134,6 +165,16 @@ def _stored_normals(part: Any) -> Floats | None:
     return normals if normals.shape == part.vertices.shape else None
 
 
+def _stored_colors(part: Any) -> NDArray[np.generic] | None:
+    """Vertex colors that the file itself has, beside a texture or without one."""
+    if getattr(part.visual, "kind", None) == "vertex":
+        return np.asarray(part.visual.vertex_colors, dtype=np.uint8)
+    colors = getattr(part.visual, "vertex_attributes", {}).get("color")
+    if colors is None or len(colors) != len(part.vertices):
+        return None
+    return _byte_colors(np.asarray(colors))
+
+
 def _stored_uvs(part: Any) -> Floats | None:
     uv = getattr(part.visual, "uv", None)
     if uv is None or np.shape(uv) != (len(part.vertices), 2):
@@ -144,36 +185,71 @@ def _stored_uvs(part: Any) -> Floats | None:
 def write_other(mesh: PolygonMesh, out: BinaryIO, format: str) -> None:
     """Write ``mesh`` in a format that trimesh writes, polygons cut into triangles.
 
-    Positions are rounded to float32, as most of these formats store them. Normals, uvs and colors go
-    along where the format has them. Raises FormatError where trimesh cannot write.
+    Positions are rounded to float32, as most of these formats store them. GLB takes normals, uvs, colors and the names
+    of materials along; a mesh of several materials becomes as many parts. STL and 3MF hold nothing but the shape, as
+    trimesh writes them: their vertices are not repeated for what they would lose. Raises FormatError where trimesh
+    cannot write.
     """
     trimesh = _import_trimesh()
-    single = np.dtype(np.float32)
-    round_to(mesh.positions, single)
-    wedges = split_vertices(mesh, single)
-    triangles = wedges.face_wedges[triangulate(mesh)]
-    attributes: dict[str, Any] = {}
-    if mesh.corner_normals is not None:
-        attributes["vertex_normals"] = wedge_rows(wedges, mesh.corner_normals, 0.0)
-    if mesh.corner_uvs is not None:
-        attributes["visual"] = _texture(wedge_rows(wedges, mesh.corner_uvs, 0.0))
-    elif mesh.vertex_colors is not None:
-        attributes["vertex_colors"] = _byte_colors(mesh.vertex_colors)[wedges.vertices]
+    round_to(mesh.positions, np.dtype(np.float32))
     try:
-        made = trimesh.Trimesh(mesh.positions[wedges.vertices], triangles, process=False, **attributes)
+        made = _scene(mesh, trimesh) if format == "glb" else _shape(mesh, trimesh)
         content: Any = made.export(file_type=format)
     except Exception as error:
         raise FormatError(f"writing {format} failed: {_one_line(error)}") from None
     out.write(content.encode() if isinstance(content, str) else content)
 
 
-def _texture(uvs: Floats) -> Any:
-    """Texture coordinates without a texture: any other material would want an image library."""
+def _shape(mesh: PolygonMesh, trimesh: Any) -> Any:
+    """The triangles alone."""
+    return trimesh.Trimesh(mesh.positions, mesh.face_vertices[triangulate(mesh)], process=False)
+
+
+def _scene(mesh: PolygonMesh, trimesh: Any) -> Any:
+    """The mesh with its attributes, one part for each material."""
+    wedges = split_vertices(mesh, np.dtype(np.float32))
+    corners = triangulate(mesh)
+    triangles = wedges.face_wedges[corners]
+    materials = np.full(len(corners), -1)
+    if mesh.face_materials is not None:
+        materials = mesh.face_materials[mesh.corner_faces[corners[:, 0]]]
+    present = np.unique(materials).tolist()
+    if len(present) < 2:
+        used = np.arange(len(wedges.vertices))
+        return _part(mesh, trimesh, wedges, used, triangles, present[0] if present else -1)
+    scene = trimesh.Scene()
+    for material in present:
+        used, local = np.unique(triangles[materials == material], return_inverse=True)
+        scene.add_geometry(_part(mesh, trimesh, wedges, used, local.reshape(-1, 3), material))
+    return scene
+
+
+def _part(mesh: PolygonMesh, trimesh: Any, wedges: Wedges, used: Ints, triangles: Ints, material: int) -> Any:
+    """The wedges ``used (w,)`` and triangles ``(t,3)`` between them."""
+    attributes: dict[str, Any] = {}
+    if mesh.corner_normals is not None:
+        attributes["vertex_normals"] = wedge_rows(wedges, mesh.corner_normals, 0.0)[used]
+    colors = None if mesh.vertex_colors is None else _byte_colors(mesh.vertex_colors)[wedges.vertices[used]]
+    uvs = None if mesh.corner_uvs is None else wedge_rows(wedges, mesh.corner_uvs, 0.0)[used]
+    if uvs is not None or material >= 0:
+        name = mesh.material_names[material] if material >= 0 else None
+        attributes["visual"] = _texture(uvs, name, colors)
+    elif colors is not None:
+        attributes["vertex_colors"] = colors
+    return trimesh.Trimesh(mesh.positions[wedges.vertices[used]], triangles, process=False, **attributes)
+
+
+def _texture(uvs: Floats | None, name: str | None, colors: NDArray[np.uint8] | None) -> Any:
+    """Texture coordinates and a material without a texture: any other would want an image library."""
     from trimesh.visual import TextureVisuals, material
 
     textured: Any = TextureVisuals
     plain: Any = material.PBRMaterial
-    return textured(uv=uvs, material=plain())
+    made = textured(uv=uvs, material=plain(name=name))
+    if colors is not None:
+        opaque = np.full((len(colors), 1), 255, dtype=np.uint8)
+        made.vertex_attributes["color"] = colors if colors.shape[1] == 4 else np.concatenate([colors, opaque], axis=1)
+    return made
 
 
 def _byte_colors(colors: NDArray[np.generic]) -> NDArray[np.uint8]:

@@ -19,6 +19,10 @@ def test_examples_work_as_they_are_shown(call, shell, folder, name, line):
     if name == "render":
         device_or_skip().close()
     (folder / "coarse.obj").write_text((folder / "cube.obj").read_text())
+    for place in ("coarse.obj", "assets/a/coarse.obj", "assets/b/coarse.obj"):
+        (folder / place).parent.mkdir(parents=True, exist_ok=True)
+        (folder / place).write_text((folder / "cube.obj").read_text())
+    assert call("refine", "coarse.obj", "golden.ply").code == 0
     assert f"  {line}\n" in call(name, "--help").out.decode()
     result = shell(line)
     assert (result.code, [text for text in result.err.splitlines() if "error" in text]) == (0, [])
