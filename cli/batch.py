@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
@@ -127,7 +127,7 @@ def work(
     return made
 
 
-def start(jobs: list[Job], count: int | None, dask: str | None, keep_going: bool) -> Iterator[tuple[int, Outcome]]:
+def start(jobs: list[Job], count: int | None, dask: str | None, keep_going: bool) -> Generator[tuple[int, Outcome], None, None]:
     """Outcomes from processes of this machine or from a cluster, with the threads that each job may use."""
     from dataclasses import replace
 

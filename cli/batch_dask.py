@@ -7,7 +7,7 @@ one by Dask's scheduler; a task does the same again, so that nothing is lost and
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from typing import Any
 
 from curvify.cli.batch_job import FAILED, Job, Outcome, do
@@ -17,7 +17,7 @@ from curvify.errors import OptionError
 PATIENCE = "10s"
 
 
-def outcomes(jobs: Sequence[Job], address: str, keep_going: bool) -> Iterator[tuple[int, Outcome]]:
+def outcomes(jobs: Sequence[Job], address: str, keep_going: bool) -> Generator[tuple[int, Outcome], None, None]:
     """Do jobs on a cluster: the number of each job and its outcome, as they come.
 
     Unless ``keep_going``, jobs that have not started when one fails are called off.
@@ -44,7 +44,8 @@ def connect(address: str) -> tuple[Any, Any]:
         raise OptionError("--dask needs Dask: pip install 'curvify[dask]'") from None
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
-        return Client(address, timeout=PATIENCE, set_as_default=False), as_completed
+        client: Any = Client
+        return client(address, timeout=PATIENCE, set_as_default=False), as_completed
     except (OSError, ValueError) as error:
         text = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise OptionError(f"no Dask scheduler at {address}: {text}") from None

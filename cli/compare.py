@@ -27,7 +27,7 @@ EXAMPLES = (
 HEAT_FORMATS = ("ply", "obj", "off", "glb")
 
 
-class Length(click.ParamType):
+class Length(click.ParamType):  # type: ignore[type-arg,unused-ignore]
     """A length in units of the file, or with ``%`` a share of the diagonal: ``(number, is_share)``."""
 
     name = "length"

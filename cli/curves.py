@@ -67,10 +67,9 @@ def curves_file(
     """Read, refine, find the curves, write them. Raises CurvifyError."""
     from curvify.cli import files
     from curvify.cli.console import Console
-    from curvify.cli.surfaces import request_for
+    from curvify.cli.surfaces import asked_for
     from curvify.curves import chained, curves
     from curvify.errors import FormatError, MeshError
-    from curvify.refinement import surface
     from curvify.words import count_of
 
     console = Console(quiet, verbose)
@@ -81,14 +80,14 @@ def curves_file(
     files.check_input(input, input_format)
     mesh = files.read_input(input, input_format)
     name = files.shown_name(input, "stdin")
-    request = request_for(input, refine_options)
+    asked = asked_for(refine_options)
     with files.naming(name, MeshError):
-        made = surface(mesh, request.scheme, **request.scheme_options)
+        made = asked.surface(mesh)
     for text in made.warnings:
         console.warn(f"{name}: {text}")
-    dense = made.refine(request.level, max_faces=request.max_faces)
-    asked = {"edges": edges, "rims": rims, "silhouette": silhouette, "cells": cells}
-    kinds = [kind for kind, wanted in asked.items() if wanted] or ["edges", "silhouette"]
+    dense = made.refine(asked.level, max_faces=asked.max_faces)
+    choice = {"edges": edges, "rims": rims, "silhouette": silhouette, "cells": cells}
+    kinds = [kind for kind, wanted in choice.items() if wanted] or ["edges", "silhouette"]
     found = {kind: curves(dense, kind, view) for kind in kinds}
     lines = {kind: segments.ends.tolist() if kind == "cells" else chained(segments) for kind, segments in found.items()}
     write_lines(output, found, lines)

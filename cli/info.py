@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from curvify.cli import options
 from curvify.cli.group import COMMANDS, Command
 from curvify.cli.surfaces import with_refine_options
+
+if TYPE_CHECKING:
+    from curvify.cli.surfaces import Asked
+    from curvify.mesh import PolygonMesh
 
 EXAMPLES = (
     ("What is in this file, and would refine complain?", "curvify info coarse.obj"),
@@ -36,15 +40,14 @@ def command(**given: Any) -> None:
 def info_file(input: str, input_format: str | None, as_json: bool, quiet: bool, **refine_options: Any) -> None:
     """Read, look, print. Raises CurvifyError for a file that cannot be read."""
     from curvify.cli import files
-    from curvify.errors import MeshError
+    from curvify.cli.surfaces import asked_for
     from curvify.inspection import describe
 
     files.check_input(input, input_format)
     mesh = files.read_input(input, input_format)
     name = files.shown_name(input, "stdin")
-    with files.naming(name, MeshError):
-        answer = describe(mesh, refine_options["weld"] or "auto")
-    answer = {"input": input, **answer, "refine": prediction(mesh, input, refine_options)}
+    asked = asked_for(refine_options)
+    answer = {"input": input, **describe(mesh, asked.mesh_options()), "refine": prediction(mesh, asked)}
     if as_json:
         options.print_json("info", answer)
     else:
@@ -53,25 +56,22 @@ def info_file(input: str, input_format: str | None, as_json: bool, quiet: bool, 
         click.echo(as_text(name, answer, quiet))
 
 
-def prediction(mesh: Any, input: str, refine_options: dict[str, Any]) -> dict[str, Any]:
+def prediction(mesh: PolygonMesh, asked: Asked) -> dict[str, Any]:
     """What refine would do: counts and warnings, or the error that it would end with, or why it was not tried."""
-    from curvify.cli.surfaces import request_for
     from curvify.errors import CurvifyError
-    from curvify.refinement import surface
 
-    request = request_for(input, refine_options)
-    asked = {"scheme": request.scheme, "level": request.level}
+    told = {"scheme": asked.scheme, "level": asked.level}
     if mesh.face_count > MOST_FACES:
-        return {**asked, "not_tried": f"the mesh has more than {MOST_FACES:,} faces"}
+        return {**told, "not_tried": f"the mesh has more than {MOST_FACES:,} faces"}
     try:
-        made = surface(mesh, request.scheme, **request.scheme_options)
+        made = asked.surface(mesh)
     except CurvifyError as error:
-        return {**asked, "error": str(error)}
+        return {**told, "error": str(error)}
     split = {name: count for name, count in made.patches.counts.items() if name.endswith("_faces") and count}
     return {
-        **asked,
+        **told,
         "patches": len(made.sides),
-        "faces": made.face_count(request.level),
+        "faces": made.face_count(asked.level),
         "cut_or_odd": split,
         "warnings": made.warnings,
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -10,7 +11,9 @@ import click
 from curvify.cli.group import Option
 
 if TYPE_CHECKING:
-    from curvify.cli.run import Request
+    from curvify.mesh import PolygonMesh
+    from curvify.options import MeshOptions
+    from curvify.refinement import Surface
 
 
 def refine_parameters(leave_out: Iterable[str] = (), headings: Iterable[str] | None = None) -> list[Option]:
@@ -47,8 +50,33 @@ def refine_values(input: str, output: str, given: dict[str, Any]) -> dict[str, A
     return {**values, **known, "input": input, "output": output}
 
 
-def request_for(input: str, given: dict[str, Any]) -> Request:
-    """Refine's request for IN, with nowhere to write."""
-    from curvify.cli.run import Request
+@dataclass(frozen=True)
+class Asked:
+    """The surface that options of refine ask for: the ``scheme``, its ``options``, the ``level`` and ``max_faces``."""
 
-    return Request(**refine_values(input, "-", given))
+    scheme: str
+    options: dict[str, Any]
+    level: int
+    max_faces: int
+
+    def mesh_options(self) -> MeshOptions:
+        """What is done with the mesh before the surface is made. Raises OptionError for what does not fit."""
+        from curvify.schemes import load_scheme
+
+        options: MeshOptions = load_scheme(self.scheme).Options(**self.options)
+        return options
+
+    def surface(self, mesh: PolygonMesh) -> Surface:
+        """The surface over a mesh. Raises CurvifyError."""
+        from curvify.refinement import surface
+
+        return surface(mesh, self.scheme, **self.options)
+
+
+def asked_for(given: dict[str, Any]) -> Asked:
+    """What the options of refine among ``given`` ask for. Raises FormatError for marks that cannot be read."""
+    from curvify.cli.run import Request, read_marks
+
+    request = Request(**refine_values("-", "-", given))
+    marks = None if request.marks is None else read_marks(request.marks)
+    return Asked(request.scheme, {**request.scheme_options, "marks": marks}, request.level, request.max_faces)

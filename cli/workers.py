@@ -11,9 +11,9 @@ import multiprocessing
 import signal
 import sys
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import wait
 from typing import Any
 
 from curvify.cli.batch_job import FAILED, Job, Outcome, do
@@ -23,14 +23,14 @@ from curvify.cli.main import Stopped
 GRACE = 10.0
 
 
-def outcomes(jobs: Sequence[Job], count: int, keep_going: bool) -> Iterator[tuple[int, Outcome]]:
+def outcomes(jobs: Sequence[Job], count: int, keep_going: bool) -> Generator[tuple[int, Outcome], None, None]:
     """Do jobs in ``count`` processes: the number of each job and its outcome, as they come.
 
     Unless ``keep_going``, no job starts after one has failed. Closing the iterator stops the workers.
     """
     waiting = deque(range(len(jobs)))
     idle: list[Worker] = []
-    busy: dict[Connection, tuple[Worker, int]] = {}
+    busy: dict[Any, tuple[Worker, int]] = {}
     try:
         while waiting or busy:
             while waiting and len(busy) < count:
@@ -38,7 +38,7 @@ def outcomes(jobs: Sequence[Job], count: int, keep_going: bool) -> Iterator[tupl
                 if worker.give(jobs[waiting[0]]):
                     busy[worker.pipe] = worker, waiting.popleft()
             for pipe in wait(list(busy)):
-                worker, index = busy.pop(pipe)  # type: ignore[index]
+                worker, index = busy.pop(pipe)
                 outcome = worker.take()
                 if worker.alive:
                     idle.append(worker)

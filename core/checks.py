@@ -15,6 +15,7 @@ from curvify import inspection
 from curvify.errors import OptionError
 from curvify.findings import MOST_PLACES, Finding, first_ids, worst_first
 from curvify.mesh import Floats, Ints, PolygonMesh
+from curvify.options import MeshOptions
 from curvify.prepare import Coarse, prepare_mesh
 from curvify.words import count_of
 
@@ -23,12 +24,12 @@ def check_mesh(mesh: PolygonMesh, conditions: Mapping[str, float | bool], weld: 
     """Findings for the conditions named, in the order of ``CONDITIONS``.
 
     Values are limits (degrees, counts), True for conditions without one. The mesh is welded first, as ``weld`` says
-    (see ``prepare_mesh``). Raises OptionError for an unknown condition, MeshError for a mesh without faces.
+    (see ``options.MeshOptions``). Raises OptionError for an unknown condition, MeshError for a mesh without faces.
     """
     unknown = sorted(set(conditions) - set(CONDITIONS))
     if unknown:
         raise OptionError(f"no condition {', '.join(unknown)}; there are {', '.join(CONDITIONS)}")
-    coarse = prepare_mesh(mesh, weld)
+    coarse = prepare_mesh(mesh, MeshOptions(weld=weld))
     return [CONDITIONS[name](coarse, float(conditions[name])) for name in CONDITIONS if name in conditions]
 
 

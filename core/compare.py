@@ -84,11 +84,12 @@ def _size(mesh: PolygonMesh) -> str:
 def _attributes(a: PolygonMesh, b: PolygonMesh, share: float, normal_tolerance: float) -> Iterator[Finding]:
     """Findings for what corners and vertices carry; attributes that neither mesh has are passed over."""
     vertices = a.face_vertices
-    for name, one, other in (
+    carried: list[tuple[str, Any, Any]] = [
         ("normals", a.corner_normals, b.corner_normals),
         ("texture coordinates", a.corner_uvs, b.corner_uvs),
         ("colors", a.vertex_colors, b.vertex_colors),
-    ):
+    ]
+    for name, one, other in carried:
         if one is None and other is None:
             continue
         if one is None or other is None:

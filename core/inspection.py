@@ -13,10 +13,12 @@ import numpy as np
 
 from curvify.arrays import distinct, values_of
 from curvify.convex import REASONS, split_polygons
+from curvify.errors import MeshError
 from curvify.mesh import Bools, Floats, Ints, PolygonMesh
 from curvify.normals import degrees_between, unit
+from curvify.options import MeshOptions
 from curvify.prepare import Coarse, prepare_mesh, without_area
-from curvify.topology import Loops, components, is_closed, signed_volume
+from curvify.topology import Loops, clean_loops, components, is_closed, signed_volume
 
 # --- edges ------------------------------------------------------------------------------------------------------
 
@@ -74,10 +76,11 @@ def unused_vertices(mesh: PolygonMesh) -> Ints:
 
 def degenerate_faces(coarse: Coarse) -> Ints:
     """Faces of the file with fewer than three distinct corners or without area."""
-    kept = np.zeros(coarse.mesh.face_count, dtype=bool)
-    kept[coarse.loops.source_faces] = True
-    kept[coarse.loops.source_faces[without_area(coarse)]] = False
-    return np.flatnonzero(~kept)
+    mesh = coarse.mesh
+    bad = np.ones(mesh.face_count, dtype=bool)
+    bad[clean_loops(mesh.face_offsets, coarse.stand_in[mesh.face_vertices]).source_faces] = False
+    bad[coarse.loops.source_faces[without_area(coarse)]] = True
+    return np.flatnonzero(bad)
 
 
 def same_loops(loops: Loops) -> Ints:
@@ -176,7 +179,8 @@ def volume(coarse: Coarse) -> float | None:
 
 def sharp_edges(coarse: Coarse) -> Bools:
     """Edges ``(E,)`` that are a crease at one end at least."""
-    return coarse.features().sharp.any(axis=1)
+    sharp: Bools = np.any(coarse.features().sharp, axis=1)
+    return sharp
 
 
 def bends(coarse: Coarse, sharp: Bools) -> tuple[Ints, Floats]:
@@ -197,14 +201,15 @@ def bends(coarse: Coarse, sharp: Bools) -> tuple[Ints, Floats]:
 # --- all of it --------------------------------------------------------------------------------------------------
 
 
-def describe(mesh: PolygonMesh, weld: str = "auto") -> dict[str, Any]:
-    """What there is to say about a mesh, as plain data: counts, sizes, shape, attributes, marks.
+def describe(mesh: PolygonMesh, options: MeshOptions | None = None) -> dict[str, Any]:
+    """What there is to say about a mesh, as plain data: counts, sizes, shape, attributes, marks by source.
 
-    Lengths are in units of the file, angles in degrees. ``shape`` is None for a mesh without faces.
+    Lengths are in units of the file, angles in degrees. ``shape`` is None for a mesh that no surface can be built on.
     """
-    shape = None
-    if mesh.face_count and mesh.face_sizes.max() >= 3:
-        shape = _shape(prepare_mesh(mesh, weld))
+    try:
+        coarse = prepare_mesh(mesh, options)
+    except MeshError:
+        coarse = None
     return {
         "vertices": mesh.vertex_count,
         "faces": mesh.face_count,
@@ -212,9 +217,9 @@ def describe(mesh: PolygonMesh, weld: str = "auto") -> dict[str, Any]:
         "unused_vertices": len(unused_vertices(mesh)),
         "polygons": {str(size): int(np.count_nonzero(mesh.face_sizes == size)) for size in values_of(mesh.face_sizes)},
         "bounds": _bounds(mesh.positions),
-        "shape": shape,
+        "shape": None if coarse is None else _shape(coarse),
         "attributes": _attributes(mesh),
-        "marks": {"file": mesh.marks.counts()},
+        "marks": {} if coarse is None else coarse.marks.counts,
     }
 
 

@@ -19,6 +19,7 @@ from curvify.errors import MeshError
 from curvify.inspection import same_loops
 from curvify.mesh import Bools, Floats, Ints, Marks, PolygonMesh
 from curvify.normals import unit
+from curvify.options import MeshOptions
 from curvify.polygons import newell_normals
 from curvify.prepare import prepare_mesh, without_area
 from curvify.topology import Loops, Topology, build_topology, components, fans
@@ -63,10 +64,10 @@ class _Work:
 def repair_mesh(mesh: PolygonMesh, weld: str = "auto", holes: int = 0) -> tuple[PolygonMesh, list[str]]:
     """The mesh mended, and a sentence for each kind of thing that was done.
 
-    ``weld`` as in ``prepare_mesh``. Boundary loops of up to ``holes`` edges are closed, each by one polygon.
+    ``weld`` as in ``MeshOptions``. Boundary loops of up to ``holes`` edges are closed, each by one polygon.
     Positions stay; vertices that are in no face go, so that ids change. Raises MeshError for a mesh without faces.
     """
-    coarse = prepare_mesh(mesh, weld)
+    coarse = prepare_mesh(mesh, MeshOptions(weld=weld, sharp_from="none"))  # no marks: holes stay
     work = _Work(coarse.positions, np.arange(len(coarse.positions)), coarse.loops, np.zeros(len(coarse.area), bool))
     _note(work, mesh.face_count - len(coarse.area), "face with fewer than 3 distinct corners", "removed")
     bad = without_area(coarse)
@@ -293,22 +294,28 @@ def _as_mesh(mesh: PolygonMesh, work: _Work) -> PolygonMesh:
 
 def _marks(marks: Marks, mesh: PolygonMesh, work: _Work, number: Ints) -> Marks:
     """Marks by the new ids; those of vertices and faces that are gone go too, and a repeated vertex keeps them once."""
-    stand_in = np.full(mesh.vertex_count, -1)
-    stand_in[mesh.face_vertices[work.loops.source_corners]] = number[work.loops.vertices]
-    faces = work.loops.source_faces
-    creases, straight = stand_in[marks.crease_edges], stand_in[marks.straight_edges]
-    corners = stand_in[marks.corner_vertices]
-    kept = (creases >= 0).all(axis=1)
-    return replace(
-        marks,
-        crease_edges=creases[kept],
-        crease_sharpness=marks.crease_sharpness[kept],
-        straight_edges=straight[(straight >= 0).all(axis=1)],
-        corner_vertices=corners[corners >= 0],
-        corner_sharpness=marks.corner_sharpness[corners >= 0],
-        flat_faces=np.flatnonzero(np.isin(faces, marks.flat_faces)),
-        hole_faces=np.flatnonzero(np.isin(faces, marks.hole_faces)),
-    )
+    vertices = np.full(mesh.vertex_count, -1)
+    vertices[mesh.face_vertices[work.loops.source_corners]] = number[work.loops.vertices]
+    faces = np.full(mesh.face_count, -1)
+    faces[work.loops.source_faces] = np.arange(len(work.loops.source_faces))
+    changes: dict[str, Any] = {}
+    for ids, values, new in (
+        ("crease_edges", "crease_sharpness", vertices),
+        ("straight_edges", "", vertices),
+        ("bent_edges", "edge_normals", vertices),
+        ("curled_edges", "kappas", vertices),
+        ("corner_vertices", "corner_sharpness", vertices),
+        ("flat_faces", "", faces),
+        ("hole_faces", "", faces),
+        ("bulged_faces", "bulges", faces),
+        ("full_faces", "alphas", faces),
+    ):
+        moved = new[getattr(marks, ids)]
+        kept = (moved >= 0) if moved.ndim == 1 else (moved >= 0).all(axis=1)
+        changes[ids] = moved[kept]
+        if values:
+            changes[values] = getattr(marks, values)[kept]
+    return replace(marks, **changes)
 
 
 # --- holes ------------------------------------------------------------------------------------------------------
