@@ -127,7 +127,9 @@ def work(
     return made
 
 
-def start(jobs: list[Job], count: int | None, dask: str | None, keep_going: bool) -> Generator[tuple[int, Outcome], None, None]:
+def start(
+    jobs: list[Job], count: int | None, dask: str | None, keep_going: bool
+) -> Generator[tuple[int, Outcome], None, None]:
     """Outcomes from processes of this machine or from a cluster, with the threads that each job may use."""
     from dataclasses import replace
 

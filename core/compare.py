@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 
 from curvify.deviation import SAMPLES, Apart, same_topology, surfaces_apart
 from curvify.findings import MOST_PLACES, Finding, first_ids, worst_first
-from curvify.mesh import Bools, Floats, PolygonMesh
+from curvify.mesh import Bools, Floats, Ints, PolygonMesh
 from curvify.normals import SAME_NORMAL, degrees_between
 from curvify.words import count_of
 
@@ -97,27 +97,45 @@ def _attributes(a: PolygonMesh, b: PolygonMesh, share: float, normal_tolerance: 
         elif one.shape != other.shape:
             yield Finding(name, False, f"A has {one.shape[1]} for each, B has {other.shape[1]}")
         elif name == "normals":
-            yield _values(name, one, other, normal_tolerance, vertices, degrees=True)
+            yield _values(name, one, other, normal_tolerance, vertices, degrees_between, " degrees")
         elif name == "colors":
             step = (1.0 if one.dtype.kind != "f" else 1 / 255) if share else 0.0
-            yield _values(name, one.astype(np.float64), other.astype(np.float64), step, np.arange(a.vertex_count))
+            one, other = one.astype(np.float64), other.astype(np.float64)
+            yield _values(name, one, other, step, np.arange(a.vertex_count), _largest_step)
         else:
             yield _values(name, one, other, share * _extent(one[~np.isnan(one).any(axis=1)]), vertices)
 
 
-def _values(name: str, a: Floats, b: Floats, tolerance: float, owners: Any, degrees: bool = False) -> Finding:
+def _distance(a: Floats, b: Floats) -> Floats:
+    """Distance between rows."""
+    return np.linalg.norm(a - b, axis=1)
+
+
+def _largest_step(a: Floats, b: Floats) -> Floats:
+    """Largest difference in each of the rows."""
+    return np.abs(a - b).max(axis=1)
+
+
+def _values(
+    name: str,
+    a: Floats,
+    b: Floats,
+    tolerance: float,
+    owners: Ints,
+    measure: Callable[[Floats, Floats], Floats] = _distance,
+    unit: str = "",
+) -> Finding:
     """Rows of numbers that belong to the vertices ``owners``: how far they are apart, and the worst."""
     differ: Bools = ((a != b) & ~(np.isnan(a) & np.isnan(b))).any(axis=1)
     if not differ.any():
         return Finding(name, True, "equal", tolerance, 0.0)
     rows = np.flatnonzero(differ)
     off = np.zeros(len(a))
-    off[rows] = degrees_between(a[rows], b[rows]) if degrees else np.linalg.norm(a[rows] - b[rows], axis=1)
+    off[rows] = measure(a[rows], b[rows])
     off[np.isnan(off)] = np.inf
     failing = off > tolerance if tolerance else differ
     worst = worst_first(off, failing)
     at = int(worst[0]) if len(worst) else int(off.argmax())
-    unit = " degrees" if degrees else ""
     vertex = int(owners[at])
     reason = f"up to {off[at]:.4g}{unit} apart, at vertex {vertex}: {_row(a[at])} in A, {_row(b[at])} in B"
     vertices = list(dict.fromkeys(owners[worst].tolist()))

@@ -15,6 +15,7 @@ from click import __file__ as click_file
 
 import curvify
 from surfaces import torus
+from curvify.cli.group import COMMANDS
 
 CURVIFY = [sys.executable, "-c", "from curvify.cli.main import main; main()"]
 LONG = ["-k", "400"]  # minutes
@@ -40,16 +41,21 @@ def test_version_imports_nothing_but_itself(process):
     assert not imported("--version") & {"click", "numpy", "curvify.cli.group"}
 
 
-@pytest.mark.parametrize("args", [["--help"], ["refine", "--help"], ["split", "-h"], ["schemes", "-h"]])
+@pytest.mark.parametrize("args", [["--help"], *([name, "--help"] for name in COMMANDS)])
 def test_help_imports_click_only(args):
     assert Path(click_file).exists()
     found = imported(*args)
     assert "click" in found
-    assert not found & {"numpy", "tqdm", "trimesh", "curvify.mesh"}
+    assert not found & {"numpy", "tqdm", "trimesh", "igl", "distributed", "multiprocessing", "curvify.mesh"}
 
 
 def test_help_of_the_group_imports_no_command():
     assert not imported("--help") & {"curvify.cli.refine", "curvify.cli.split", "curvify.cli.options"}
+
+
+def test_looking_at_a_mesh_imports_no_heavy_library(folder):
+    for args in (["info", "cube.obj"], ["check", "cube.obj", "--convex"], ["compare", "cube.obj", "cube.obj"]):
+        assert not imported(*args) & {"trimesh", "scipy", "igl", "tqdm", "multiprocessing", "distributed", "moderngl"}
 
 
 def test_refine_imports_what_it_needs(folder):
