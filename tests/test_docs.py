@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -39,3 +43,50 @@ def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8")):
         if "://" not in target:
             assert (page.parent / target).exists(), f"{page.name} links to {target}"
+
+
+@pytest.fixture
+def bash(tmp_path: Path):
+    """Run lines in a folder of its own, in which ``curvify`` is this one."""
+    program = tmp_path / "bin" / "curvify"
+    program.parent.mkdir()
+    program.write_text(f"#!/bin/sh\nexec '{sys.executable}' -c 'from curvify.cli.main import main; main()' \"$@\"\n")
+    program.chmod(0o755)
+    environment = os.environ | {"PATH": f"{program.parent}{os.pathsep}{os.environ['PATH']}"}
+
+    def bash(lines: str) -> str:
+        ended = subprocess.run(
+            ["bash", "-ec", lines], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120
+        )
+        assert ended.returncode == 0, f"{lines}\n{ended.stdout}{ended.stderr}"
+        return ended.stdout
+
+    return bash
+
+
+def shell_blocks(page: str) -> list[str]:
+    """The lines that a page asks to type."""
+    return re.findall(r"```sh\n(.*?)```", (DOCS / page).read_text(encoding="utf-8"), re.DOTALL)
+
+
+def test_the_page_on_checking_works_as_written(bash, tmp_path: Path) -> None:
+    shutil.copy(ROOT / "sample_meshes" / "pawn.obj", tmp_path / "part.obj")
+    (tmp_path / "assets" / "inner").mkdir(parents=True)
+    shutil.copy(tmp_path / "part.obj", tmp_path / "assets" / "inner")
+    blocks = shell_blocks("checking.md")
+    assert len(blocks) >= 5
+    for block in blocks:
+        bash(block)
+    recipe = re.search(r"```make\n(.*?)```", (DOCS / "checking.md").read_text(encoding="utf-8"), re.DOTALL)
+    assert recipe is not None
+    (tmp_path / "Makefile").write_text(recipe[1])
+    assert "yes: equal" in bash("make --silent golden-check")
+
+
+def test_the_lines_on_completion_give_scripts(bash) -> None:
+    sources = re.findall(r"_CURVIFY_COMPLETE=\w+_source curvify", "".join(shell_blocks("shell-completion.md")))
+    assert len(sources) == 3
+    for source in sources:
+        assert "_curvify_completion" in bash(source)
+    typed = "COMP_WORDS=(curvify ref); COMP_CWORD=1; _curvify_completion curvify; echo ${COMPREPLY[0]}"
+    assert bash(f'eval "$({sources[0]})"; {typed}') == "refine\n"

@@ -245,9 +245,9 @@ def check_outputs() -> None:
 
 
 @LINUX
-def test_a_killed_worker_costs_its_file_only(call, process, folder):
+def test_a_killed_worker_costs_its_file_only(process, folder):
     many(50)
-    level = ["-k", "60"]
+    level = ["-k", "30"]
     assert process("refine", "cube.obj", "expected.ply", *level).code == 0
     arguments = batch(*level, "--keep-going", "--report", "report.json")
     with subprocess.Popen([*CURVIFY, *arguments], stderr=subprocess.PIPE) as running:
@@ -262,7 +262,7 @@ def test_a_killed_worker_costs_its_file_only(call, process, folder):
     assert "was killed (SIGKILL)" in err
     check_outputs()
     assert parts() == []
-    result = call(*batch(*level, "--skip-existing", "--report", "-"))
+    result = process(*batch(*level, "--skip-existing", "--report", "-"))
     assert result.code == 0
     assert list(statuses(result.out).values()).count("done") == found.count("failed")
     assert len(outputs()) == 50
@@ -272,7 +272,7 @@ def test_a_killed_worker_costs_its_file_only(call, process, folder):
 @LINUX
 def test_a_killed_batch_leaves_what_the_next_one_removes(process, folder):
     many(50)
-    level = ["-k", "60"]
+    level = ["-k", "30"]
     assert process("refine", "cube.obj", "expected.ply", *level).code == 0
     with subprocess.Popen([*CURVIFY, *batch(*level)], stderr=subprocess.DEVNULL) as running:
         wait_for(lambda: len(list(Path("out").glob("*.ply"))) >= 5 and parts())
@@ -284,7 +284,8 @@ def test_a_killed_batch_leaves_what_the_next_one_removes(process, folder):
     assert 5 <= before < 50
     result = process(*batch(*level, "--skip-existing", "--report", "-", "-v"))
     assert result.code == 0
-    assert 5 <= list(statuses(result.out).values()).count("skipped") <= before
+    skipped = list(statuses(result.out).values()).count("skipped")
+    assert before - 2 <= skipped <= before  # each worker may have died before its stamp
     assert parts() == []
     assert len(outputs()) == 50
     check_outputs()
@@ -349,7 +350,7 @@ def test_no_dask(call, assets, monkeypatch):
 def test_nothing_is_lost_when_a_dask_worker_dies(call, process, folder):
     distributed = pytest.importorskip("distributed", reason="needs the extra dask")
     many(30)
-    level = ["-k", "40"]
+    level = ["-k", "20"]
     assert process("refine", "cube.obj", "expected.ply", *level).code == 0
     settings = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
     with distributed.LocalCluster(**settings) as cluster:
