@@ -3,8 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint goldens pictures clean
-.PHONY: demo test lint goldens docs clean
+.PHONY: demo test lint goldens pictures docs clean
 
 $(VENV)/demo.stamp: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -37,6 +36,7 @@ goldens: $(VENV)/test.stamp
 # The pictures of the README; they need OpenGL, which Mesa provides in software.
 pictures: $(VENV)/demo.stamp
 	$(BIN)/python docs/pictures/make_pictures.py
+
 # The pages of the commands, from what the commands say.
 docs: $(VENV)/test.stamp
 	$(BIN)/python docs/make_commands.py

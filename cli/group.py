@@ -13,18 +13,15 @@ from curvify import __version__
 #: Every command, with the line that `curvify --help` shows; the command is ``command`` in the module of its name.
 COMMANDS = {
     "refine": "Turn a coarse polygon mesh into a dense mesh of a smooth surface.",
-    "repair": "Mend what refine only warns of.",
-    "split": "Cut concave and many-sided faces into convex ones.",
-    "marks": "Write the sharp features of a mesh as a marks file.",
-    "render": "Draw meshes side by side into a PNG picture.",
     "batch": "Refine many meshes in parallel.",
     "info": "Show what a mesh is like and what refine would do with it.",
     "check": "Check that a mesh is what it should be; the exit code tells.",
     "compare": "Compare two meshes; the exit code tells whether they agree.",
+    "render": "Draw meshes side by side into a PNG picture.",
+    "curves": "Write the curves of a surface: edges, rims, silhouettes, cells.",
     "repair": "Mend what refine only warns of.",
     "split": "Cut concave and many-sided faces into convex ones.",
     "marks": "Write the sharp features of a mesh as a marks file.",
-    "curves": "Write the curves of a surface: edges, rims, silhouettes, cells.",
     "schemes": "List the surface schemes and their options.",
     "backends": "List what can evaluate surfaces: the processor, and the GPU that was found.",
 }

@@ -18,7 +18,6 @@ EXAMPLES = [(name, line) for name, command in FOUND.items() for _, line in comma
 def test_examples_work_as_they_are_shown(call, shell, folder, name, line):
     if name == "render":
         device_or_skip().close()
-    (folder / "coarse.obj").write_text((folder / "cube.obj").read_text())
     for place in ("coarse.obj", "assets/a/coarse.obj", "assets/b/coarse.obj"):
         (folder / place).parent.mkdir(parents=True, exist_ok=True)
         (folder / place).write_text((folder / "cube.obj").read_text())
