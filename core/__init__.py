@@ -16,10 +16,15 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from curvify.checks import check_mesh
+    from curvify.compare import compare_meshes, compare_surfaces
+    from curvify.deviation import deviations
     from curvify.errors import CurvifyError, DeviceError, FormatError, LimitError, MeshError, OptionError
+    from curvify.inspection import describe
     from curvify.mesh import DenseMesh, Marks, PolygonMesh
     from curvify.pieces import split_mesh
     from curvify.refinement import Surface, refine, surface
+    from curvify.repair import repair_mesh
 
 _WHERE = {
     "CurvifyError": "errors",
@@ -32,7 +37,13 @@ _WHERE = {
     "Marks": "mesh",
     "PolygonMesh": "mesh",
     "Surface": "refinement",
+    "check_mesh": "checks",
+    "compare_meshes": "compare",
+    "compare_surfaces": "compare",
+    "describe": "inspection",
+    "deviations": "deviation",
     "refine": "refinement",
+    "repair_mesh": "repair",
     "split_mesh": "pieces",
     "surface": "refinement",
 }
@@ -49,8 +60,14 @@ __all__ = [
     "PolygonMesh",
     "Surface",
     "__version__",
+    "check_mesh",
+    "compare_meshes",
+    "compare_surfaces",
+    "describe",
+    "deviations",
     "read",
     "refine",
+    "repair_mesh",
     "split_mesh",
     "surface",
     "write",

@@ -81,6 +81,9 @@ def test_the_page_on_checking_works_as_written(bash, tmp_path: Path) -> None:
     assert recipe is not None
     (tmp_path / "Makefile").write_text(recipe[1])
     assert "yes: equal" in bash("make --silent golden-check")
+    (code,) = re.findall(r"```python\n(.*?)```", (DOCS / "checking.md").read_text(encoding="utf-8"), re.DOTALL)
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, "0")
 
 
 def test_the_lines_on_completion_give_scripts(bash) -> None:
