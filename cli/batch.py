@@ -167,6 +167,9 @@ def tell(jobs: list[Job], made: list[Outcome], report: str | None, console: Any)
     if not failed:
         console.tell(summary(made))
         return
-    first, outcome = failed[0]
-    text = outcome.error if outcome.error.startswith(first.name) else f"{first.name}: {outcome.error}"
-    raise CurvifyError(f"{summary(made)}; {text}")
+    named = [(job.name, outcome.error) for job, outcome in failed]
+    texts = [error if error.startswith(name) else f"{name}: {error}" for name, error in named]
+    if console.quiet:  # and there was no table
+        for text in texts[1:]:
+            say(f"curvify: error: {text}")
+    raise CurvifyError(f"{summary(made)}; {texts[0]}")

@@ -60,7 +60,7 @@ def command(**given: Any) -> None:
 
     The exit code is 0 if IN meets all conditions, 1 if it does not, 2 if it cannot be read. One line for each
     condition says why and where: vertices, edges and faces are counted from 0. Seams are closed before anything is
-    counted (see --weld). Creases are edges where the normals of IN differ.
+    counted (see --weld). Creases are what refine takes for creases: normals of IN that differ, tags, smoothing groups.
     """
     check_file(**given)
 

@@ -50,40 +50,17 @@ def command(**given: Any) -> None:
 
 
 def repair_file(
-    input: str,
-    output: str,
-    holes: int,
-    weld: str | None,
-    input_format: str | None,
-    output_format: str | None,
-    precision: str,
-    ascii: bool,
-    no_clobber: bool,
-    quiet: bool,
-    verbose: bool,
+    input: str, output: str, holes: int, weld: str | None, quiet: bool, verbose: bool, **ends: Any
 ) -> None:
     """Read, mend, write. Raises CurvifyError."""
-    import numpy as np
-
-    from curvify.cli import files
     from curvify.cli.console import Console
-    from curvify.errors import FormatError, MeshError, OptionError
-    from curvify.formats import write_mesh
+    from curvify.cli.polygons import change_file
+    from curvify.mesh import PolygonMesh
     from curvify.repair import repair_mesh
 
-    console = Console(quiet, verbose)
-    format = files.check_output(output, output_format, no_clobber)
-    if ascii and format != "ply":
-        raise OptionError(f"--ascii is for PLY; {format} has no such choice")
-    files.check_input(input, input_format)
-    mesh = files.read_input(input, input_format)
-    name = files.shown_name(input, "stdin")
-    with files.naming(name, MeshError):
+    def mend(mesh: PolygonMesh) -> tuple[PolygonMesh, list[str]]:
         mended, notes = repair_mesh(mesh, weld or "auto", holes)
-    for text in mesh.warnings:
-        console.warn(f"{name}: {text}")
-    for text in notes or ["nothing to mend"]:
-        console.tell(f"{name}: {text}")
-    kind = mesh.position_dtype if precision == "input" else np.dtype(precision)
-    with files.naming(files.shown_name(output, "stdout"), FormatError):
-        write_mesh(mended, output, format, ascii=ascii, dtype=kind)
+        return mended, notes or ["nothing to mend"]
+
+    console = Console(quiet, verbose)
+    change_file(mend, console.tell, console, input, output, **ends)

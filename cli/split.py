@@ -42,42 +42,18 @@ def command(**given: Any) -> None:
 
 
 def split_file(
-    input: str,
-    output: str,
-    split_rule: str | None,
-    max_sides: int,
-    input_format: str | None,
-    output_format: str | None,
-    precision: str,
-    ascii: bool,
-    no_clobber: bool,
-    quiet: bool,
-    verbose: bool,
+    input: str, output: str, split_rule: str | None, max_sides: int, quiet: bool, verbose: bool, **ends: Any
 ) -> None:
     """Read, split, write. Raises CurvifyError."""
-    import numpy as np
-
     from curvify.cli import files
     from curvify.cli.console import Console
-    from curvify.errors import FormatError, MeshError, OptionError
-    from curvify.formats import write_mesh
+    from curvify.cli.polygons import change_file
     from curvify.pieces import split_mesh
     from curvify.words import count_of
 
     console = Console(quiet, verbose)
-    format = files.check_output(output, output_format, no_clobber)
-    if ascii and format != "ply":
-        raise OptionError(f"--ascii is for PLY; {format} has no such choice")
-    files.check_input(input, input_format)
-    mesh = files.read_input(input, input_format)
-    name = files.shown_name(input, "stdin")
-    if not mesh.face_count:
-        raise MeshError(f"{name}: the mesh has no faces; give a mesh with polygons")
-    pieces, notes = split_mesh(mesh, split_rule or "best", max_sides)
-    for text in [*mesh.warnings, *notes]:
-        console.warn(f"{name}: {text}")
+    mesh, pieces = change_file(
+        lambda mesh: split_mesh(mesh, split_rule or "best", max_sides), console.warn, console, input, output, **ends
+    )
     target = files.shown_name(output, "stdout")
-    kind = mesh.position_dtype if precision == "input" else np.dtype(precision)
-    with files.naming(target, FormatError):
-        write_mesh(pieces, output, format, ascii=ascii, dtype=kind)
     console.explain(f"{target}: {count_of(mesh.face_count, 'face')} became {pieces.face_count:,}")

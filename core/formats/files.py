@@ -64,8 +64,11 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         raise FormatError(f"{name!r}: cannot write: that is not a file name") from None
     except OSError as error:
         raise _explain(name, "write", error) from None
+    held = None
     try:
         with opened:
+            if temporary and os.name == "posix":
+                held = os.dup(opened.fileno())  # keeps the lock until the file has its name
             yield opened
         if temporary and target:
             os.replace(temporary, target)
@@ -76,6 +79,9 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         if isinstance(error, OSError) and error.errno in _NO_ROOM:
             raise _explain(name, "write", error) from None
         raise
+    finally:
+        if held is not None:
+            os.close(held)
 
 
 def _open_stream(name: str) -> BinaryIO | None:

@@ -97,6 +97,14 @@ def test_a_failure_stops_the_rest_unless_told_to_go_on(call, assets):
     assert last == "curvify: error: 3 done, 1 failed; assets/a/bad.obj:1: face refers to vertex 1, the file has 0"
 
 
+def test_all_failures_are_told_without_a_table(call, assets):
+    for name in ("bad", "worse"):
+        Path(f"assets/{name}.obj").write_text("f 1 2 3\n")
+    lines = call(*batch("--keep-going", "-q")).err.splitlines()
+    assert [line.split()[1:3] for line in lines] == [["error:", "assets/worse.obj:1:"], ["error:", "3"]]
+    assert "assets/bad.obj:1:" in lines[1]
+
+
 def test_warnings_are_shown_and_counted(call, assets):
     Path("assets/dart.obj").write_text(Path("dart.obj").read_text())
     result = call(*batch())
