@@ -149,11 +149,14 @@ def remove_leftovers(folder: Path) -> int:
         with suppress(OSError):
             descriptor = os.open(path, os.O_RDWR)
             try:
-                if _lock(descriptor):
+                ours = _lock(descriptor)
+                if ours and os.name == "posix":
                     path.unlink()
-                    removed += 1
             finally:
                 os.close(descriptor)
+            if ours and os.name != "posix":  # where no one removes a file that is open, themselves included
+                path.unlink()
+            removed += ours
     return removed
 
 
