@@ -9,7 +9,7 @@ are repeated; closed pieces are turned outside out; small holes are closed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from curvify.normals import unit
 from curvify.options import MeshOptions
 from curvify.polygons import newell_normals
 from curvify.prepare import prepare_mesh, without_area
+from curvify.records import replaced
 from curvify.topology import Loops, Topology, build_topology, components, fans
 from curvify.words import count_of
 
@@ -57,7 +58,7 @@ class _Work:
         start, size = np.repeat(loops.offsets[:-1], sizes), np.repeat(sizes, sizes)
         corner = np.arange(len(loops.vertices))
         order = np.where(np.repeat(faces, sizes), start + (size - (corner - start)) % size, corner)
-        self.loops = replace(loops, vertices=loops.vertices[order], source_corners=loops.source_corners[order])
+        self.loops = replaced(loops, vertices=loops.vertices[order], source_corners=loops.source_corners[order])
         self.flipped = self.flipped ^ faces
 
 
@@ -184,7 +185,7 @@ def _split_vertices(work: _Work) -> None:
     topology = work.topology()
     crowded = topology.uses > 2
     twin = _paired_twins(work, topology, crowded)
-    around = fans(replace(topology, twin=twin))
+    around = fans(replaced(topology, twin=twin))
     leaders = np.flatnonzero(np.bincount(around, minlength=len(around)))
     order = leaders[np.argsort(topology.vertices[leaders], kind="stable")]
     owner = topology.vertices[order]
@@ -195,7 +196,7 @@ def _split_vertices(work: _Work) -> None:
     number[order] = np.where(more, len(work.positions) + np.cumsum(more) - 1, owner)
     work.origin = np.concatenate([work.origin, work.origin[owner[more]]])
     work.positions = work.positions[np.concatenate([np.arange(len(work.positions)), owner[more]])]
-    work.loops = replace(work.loops, vertices=number[around])
+    work.loops = replaced(work.loops, vertices=number[around])
     _note(work, int(crowded.sum()), "edge of more than two faces", "taken apart", "edges of more than two faces")
     _note(work, int(more.sum()), "vertex", "repeated where surfaces only touch", "vertices")
 
@@ -315,7 +316,7 @@ def _marks(marks: Marks, mesh: PolygonMesh, work: _Work, number: Ints) -> Marks:
         changes[ids] = moved[kept]
         if values:
             changes[values] = getattr(marks, values)[kept]
-    return replace(marks, **changes)
+    return replaced(marks, **changes)
 
 
 # --- holes ------------------------------------------------------------------------------------------------------

@@ -139,23 +139,24 @@ def _lock(descriptor: int) -> bool:
     return True
 
 
-def remove_leftovers(folder: Path) -> int:
+def remove_leftovers(folder: str | os.PathLike[str]) -> int:
     """Remove the temporary files that killed processes have left in a folder; how many there were.
 
     Those that a living process still writes are locked and stay.
     """
     removed = 0
-    for path in folder.glob(".curvify-*.part"):
+    names = [name for name in os.listdir(folder) if re.match(r"\.curvify-.*\.part\Z", name)]
+    for path in [os.path.join(folder, name) for name in names]:
         with suppress(OSError):
             descriptor = os.open(path, os.O_RDWR)
             try:
                 ours = _lock(descriptor)
                 if ours and os.name == "posix":
-                    path.unlink()
+                    os.unlink(path)
             finally:
                 os.close(descriptor)
             if ours and os.name != "posix":  # where no one removes a file that is open, themselves included
-                path.unlink()
+                os.unlink(path)
             removed += ours
     return removed
 

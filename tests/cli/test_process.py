@@ -14,8 +14,8 @@ import pytest
 from click import __file__ as click_file
 
 import curvify
-from surfaces import torus
 from curvify.cli.group import COMMANDS
+from surfaces import torus
 
 CURVIFY = [sys.executable, "-c", "from curvify.cli.main import main; main()"]
 LONG = ["-k", "400"]  # minutes
