@@ -22,6 +22,8 @@ SURFACE, SHARP, MESH, OUTPUT, RUNNING, MESSAGES = (
     "Messages",
 )
 POSITIVE = click.IntRange(min=1)
+#: More faces than this in one range are a slip of the keyboard.
+MOST_FACES = 10_000_000
 
 
 def option(heading: str, *names: str, **attributes: Any) -> Callable[[Function], Function]:
@@ -64,7 +66,8 @@ level = option(
     type=POSITIVE,
     default=5,
     show_default=True,
-    help="Every edge becomes 2 K segments, a polygon with n sides n K^2 quads.",
+    help="Every edge becomes 2 K segments, a polygon with n sides n K^2 quads, a triangle of the triangle schemes "
+    "(2 K)^2 triangles.",
     metavar="K",
 )
 cross_tangent = option(
@@ -74,7 +77,13 @@ cross_tangent = option(
     help="How fast the surface leaves the edges: 'precise' for accuracy, 'smooth' its forerunner, the others as in "
     "the paper.  [default: precise]",
 )
-alpha = option(SURFACE, "--alpha", type=float, metavar="A", help="Fullness of 'quadratic', above 0.  [default: 1]")
+alpha = option(
+    SURFACE,
+    "--alpha",
+    type=float,
+    metavar="A",
+    help="Fullness of 'quadratic', above 0  [default: 1]; of phong, from 0 to 1  [default: 0.75]",
+)
 bulge = option(
     SURFACE,
     "--bulge",
@@ -85,8 +94,80 @@ bulge = option(
 normals = option(
     SURFACE,
     "--normals",
-    type=click.Choice(["exact", "paper"]),
-    help="Normals of the surface itself, or the paper's approximation.  [default: exact]",
+    type=click.Choice(["exact", "paper", "smooth"]),
+    help="Normals of the surface itself; the paper's approximation (gregory); or such as vary smoothly (png1).  "
+    "[default: exact]",
+)
+kappa = option(
+    SURFACE,
+    "--kappa",
+    type=float,
+    metavar="K",
+    help="png1: lift faces along their creases by this length; below 0, sharper ridges.  [default: 0]",
+)
+crease_units = option(
+    SURFACE,
+    "--crease-units",
+    type=click.Choice(["absolute", "edge"]),
+    help="Whether kappa is a length or a share of the edge's.  [default: absolute]",
+)
+
+
+def face_list(context: click.Context, parameter: click.Parameter, value: str | None) -> tuple[int, ...]:
+    """Faces from text such as ``3,7-9``."""
+    faces: list[int] = []
+    for part in [] if value is None else value.split(","):
+        first, dash, last = (piece.strip() for piece in part.partition("-"))
+        plain = first.isdecimal() and (last.isdecimal() if dash else not last)
+        if not plain or not 0 <= int(last or first) - int(first) < MOST_FACES:
+            raise click.BadParameter(f"{part!r} is no face or range of faces; write for example 3,7-9")
+        faces += range(int(first), int(last or first) + 1)
+    return tuple(faces)
+
+
+overveld = with_options(
+    option(
+        SURFACE,
+        "--depth",
+        type=POSITIVE,
+        metavar="D",
+        help="overveld: passes; each halves every edge.  [default: enough for --level]",
+    ),
+    option(
+        SURFACE,
+        "--max-edge",
+        type=float,
+        metavar="L",
+        help="overveld: halve only edges longer than this, until none is left.",
+    ),
+    option(
+        SURFACE,
+        "--edge-rule",
+        type=click.Choice(["curvature", "stretched"]),
+        help="overveld: how edges bend.  [default: curvature]",
+    ),
+    option(
+        SURFACE,
+        "--midpoint-normal",
+        type=click.Choice(["quad", "perp", "avg", "geometry"]),
+        help="overveld: normals in the middle of edges: quadratic, across the curve, mean, or of the new triangles.  "
+        "[default: quad]",
+    ),
+    option(
+        SURFACE,
+        "--apex",
+        type=float,
+        metavar="LAMBDA",
+        help="overveld: apex of polygons over 4 sides, from full (0) to their middle (1).  [default: 0]",
+    ),
+    option(SURFACE, "--rim", is_flag=True, help="overveld: keep plane rims of open meshes plane."),
+    option(
+        SURFACE,
+        "--planar",
+        metavar="FACES",
+        callback=face_list,
+        help="overveld: keep these faces plane, for example 3,7-9 (counted from 0).",
+    ),
 )
 
 # --- input ------------------------------------------------------------------------------------------------------

@@ -5,21 +5,16 @@ from __future__ import annotations
 import io
 
 from curvify.formats.dense import PlySink
-from curvify.refinement import Surface
+from curvify.refinement import Refinable
 from curvify.sinks import DenseLayout
 
 #: Characters of a number in text, sign and dot included, with the blank before it.
 DIGITS = {"float32": 11, "float64": 19}
 
 
-def predicted_faces(surface: Surface, level: int, triangulate: bool) -> int:
-    """Faces of the dense mesh as written."""
-    return surface.face_count(level) * (_cell_size(surface) - 2 if triangulate else 1)
-
-
-def _cell_size(surface: Surface) -> int:
-    patches = surface.patches
-    return int(patches.sampling(patches.classes[0].sides, 1).cells.shape[1])
+def predicted_faces(surface: Refinable, level: int, triangulate: bool, enough: int | None = None) -> int:
+    """Faces of the dense mesh as written; some number above ``enough`` if there are more than that."""
+    return surface.face_count(level, enough) * (surface.cell_size - 2 if triangulate else 1)
 
 
 def predicted_bytes(layout: DenseLayout, format: str, ascii: bool, triangulate: bool) -> int:

@@ -13,6 +13,7 @@ from curvify import __version__
 from curvify.mesh import Floats, Ints
 from curvify.polygons import newell_normals
 from curvify.quality import edge_angles
+from curvify.refinement import Refinable, Surface
 from curvify.schemes.base import Patches
 from curvify.sinks import DenseLayout, Sink
 from curvify.topology import is_closed, signed_volume
@@ -32,10 +33,10 @@ class Recorder:
     position wait for the end.
     """
 
-    def __init__(self, patches: Patches) -> None:
-        self.patches = patches
-        self.closed = is_closed(patches.topology)
-        self.center = patches.positions.mean(axis=0)
+    def __init__(self, surface: Refinable) -> None:
+        self.coarse = surface
+        self.closed = is_closed(surface.topology)
+        self.center = surface.positions.mean(axis=0)
         self.deviation = 0.0
         self._missing = 0
         self._waiting: list[tuple[int, Ints]] = []
@@ -51,7 +52,7 @@ class Recorder:
         """Take the memory for the positions."""
         self.sink.begin(layout)
         kind = layout.vertex_type["position"].base
-        self._expected = self.patches.positions.astype(kind)
+        self._expected = self.coarse.positions.astype(kind)
         if self.closed:
             self._missing = layout.wedge_count
             self._positions = np.empty((layout.wedge_count, 3), dtype=kind)
@@ -97,16 +98,16 @@ class Recorder:
     @property
     def rounding(self) -> float:
         """Largest distance that rounding to the output's type moves a vertex of the input."""
-        return _distance(self.patches.positions, self._expected)
+        return _distance(self.coarse.positions, self._expected)
 
     @property
     def volume_ratio(self) -> float | None:
         """Volume of the dense mesh over that of the coarse one; None where that is open or empty."""
         if not self.closed:
             return None
-        topology = self.patches.topology
-        area = newell_normals(self.patches.positions, topology.offsets, topology.vertices)
-        coarse = signed_volume(self.patches.positions, topology.offsets, topology.vertices, area)
+        topology = self.coarse.topology
+        area = newell_normals(self.coarse.positions, topology.offsets, topology.vertices)
+        coarse = signed_volume(self.coarse.positions, topology.offsets, topology.vertices, area)
         # In the order of the faces, so that threads do not change the last digit.
         return math.fsum(self._volumes[start] for start in sorted(self._volumes)) / coarse if coarse else None
 
@@ -119,12 +120,13 @@ def _distance(a: Floats, b: Floats) -> float:
 def refine_report(run: Run, layout: DenseLayout, recorder: Recorder) -> dict[str, Any]:
     """The report of `refine`.
 
-    ``timings`` are seconds. ``g1`` is measured from each face's own derivatives, in degrees. ``vertex_deviation`` is
+    ``timings`` are seconds. ``g1`` is measured from each face's own derivatives, in degrees; null for a recursive
+    scheme. ``vertex_deviation`` is
     the largest distance between a vertex of the input, rounded to the output's type, and the same vertex as written:
     0 where the surface interpolates. ``vertex_rounding`` is how far that rounding moved a vertex at most.
     ``volume_ratio`` is null for a mesh that is not closed, ``bytes`` for an output that is not a file or a pipe.
     """
-    request, patches = run.request, run.surface.patches
+    request, surface = run.request, run.surface
     return {
         "schema": SCHEMA,
         "curvify": __version__,
@@ -136,7 +138,7 @@ def refine_report(run: Run, layout: DenseLayout, recorder: Recorder) -> dict[str
         "level": request.level,
         "backend": run.backend | {"threads": run.threads},
         "counts": {
-            "input": patches.counts,
+            "input": surface.counts,
             "output": {
                 "vertices": layout.vertex_count,
                 "wedges": layout.wedge_count,
@@ -146,11 +148,11 @@ def refine_report(run: Run, layout: DenseLayout, recorder: Recorder) -> dict[str
         },
         "timings": run.seconds,
         "bytes_sent_to_gpu": run.bytes_sent,
-        "g1": continuity(patches),
+        "g1": continuity(surface.patches) if isinstance(surface, Surface) else None,
         "vertex_deviation": _number(recorder.deviation),
         "vertex_rounding": _number(recorder.rounding),
         "volume_ratio": _number(recorder.volume_ratio),
-        "marks": patches.marks,
+        "marks": surface.marks,
         "warnings": run.warnings,
     }
 

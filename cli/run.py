@@ -11,22 +11,41 @@ from typing import Any
 
 import numpy as np
 
-from curvify.backends import Backend, open_backend
+from curvify.backends import Backend
 from curvify.cli import files
 from curvify.cli.console import Console, size
 from curvify.cli.predict import predicted_bytes, predicted_faces
 from curvify.cli.report import Recorder, refine_report, write_report
 from curvify.errors import FormatError, LimitError, MeshError, OptionError
 from curvify.formats.dense import dense_output
-from curvify.jobs import dense_layout
 from curvify.mesh import Marks, PolygonMesh
 from curvify.records import field, record
-from curvify.refinement import Surface, surface
-from curvify.schemes import load_scheme
+from curvify.refinement import Refinable, refinable
+from curvify.schemes import NAMES, load_scheme
 from curvify.sinks import DenseLayout
 from curvify.threads import processors
-from curvify.weld import number_dense_mesh
 from curvify.words import count_of
+
+#: Options that a scheme may have, one or several.
+SCHEME_OPTIONS = (
+    "cross_tangent",
+    "alpha",
+    "bulge",
+    "normals",
+    "sharp_angle",
+    "sharp_from",
+    "weld",
+    "split_rule",
+    "kappa",
+    "crease_units",
+    "depth",
+    "max_edge",
+    "edge_rule",
+    "midpoint_normal",
+    "apex",
+    "rim",
+    "planar",
+)
 
 
 @record
@@ -46,6 +65,15 @@ class Request:
     sharp_from: str | None
     weld: str | None
     split_rule: str | None
+    kappa: float | None
+    crease_units: str | None
+    depth: int | None
+    max_edge: float | None
+    edge_rule: str | None
+    midpoint_normal: str | None
+    apex: float | None
+    rim: bool
+    planar: tuple[int, ...]
     input_format: str | None
     output_format: str | None
     triangulate: bool
@@ -64,8 +92,8 @@ class Request:
     @property
     def scheme_options(self) -> dict[str, Any]:
         """The scheme's options that were given, but for the marks, which stand in a file."""
-        names = ("cross_tangent", "alpha", "bulge", "normals", "sharp_angle", "sharp_from", "weld", "split_rule")
-        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        given = {name: getattr(self, name) for name in SCHEME_OPTIONS}
+        return {name: value for name, value in given.items() if not (value is None or value is False or value == ())}
 
     @property
     def source(self) -> str:
@@ -90,7 +118,7 @@ class Run:
     options: Any
     threads: int
     mesh: PolygonMesh
-    surface: Surface
+    surface: Refinable
     dtype: np.dtype[Any]
     format: str
     warnings: list[str]
@@ -105,14 +133,14 @@ class Run:
         return self.request.triangulate or self.format not in files.POLYGON_FORMATS
 
     @property
-    def written(self) -> Surface:
+    def written(self) -> Refinable:
         """The surface as it is written."""
         return self.surface.weld_normals() if self.request.weld_normals else self.surface
 
     @property
     def faces(self) -> int:
         """Faces that will be written."""
-        return predicted_faces(self.surface, self.request.level, self.triangulate)
+        return predicted_faces(self.surface, self.request.level, self.triangulate, self.request.max_faces)
 
     @property
     def all_options(self) -> dict[str, Any]:
@@ -139,7 +167,7 @@ def refine_file(request: Request) -> Run:
         mesh = files.read_input(request.input, request.input_format)
     marks = None if request.marks is None else read_marks(request.marks)
     with timed(seconds, "prepare"), files.naming(request.source, MeshError):
-        made = surface(mesh, request.scheme, **request.scheme_options, marks=marks)
+        made = refinable(mesh, request.scheme, **request.scheme_options, marks=marks)
     warnings = [f"{request.source}: {text}" for text in made.warnings]
     for text in warnings:
         console.warn(text)
@@ -167,7 +195,7 @@ def plain_options(options: Any) -> dict[str, Any]:
 
 def check(request: Request) -> tuple[Any, str]:
     """The scheme's options and the format of OUT. Raises CurvifyError for what can be seen to fail beforehand."""
-    options = load_scheme(request.scheme).Options(**request.scheme_options)
+    options = scheme_options(request.scheme, request.scheme_options)
     format = files.check_output(request.output, request.output_format, request.no_clobber)
     if request.ascii and format != "ply":
         raise OptionError(f"--ascii is for PLY; {format} has no such choice")
@@ -175,6 +203,17 @@ def check(request: Request) -> tuple[Any, str]:
     if request.report is not None:
         _check_report(request, request.report)
     return options, format
+
+
+def scheme_options(scheme: str, given: dict[str, Any]) -> Any:
+    """The options of a scheme. Raises OptionError, also for one that only other schemes have."""
+    kind = load_scheme(scheme).Options
+    for name in given:
+        if name not in kind.__dataclass_fields__:
+            owners = [other for other in NAMES if name in load_scheme(other).Options.__dataclass_fields__]
+            schemes = f"the scheme{'s' if len(owners) > 1 else ''} {' and '.join(owners)}"
+            raise OptionError(f"--{name.replace('_', '-')} is for {schemes}, not for {scheme}")
+    return kind(**given)
 
 
 def _check_report(request: Request, report: str) -> None:
@@ -215,30 +254,31 @@ def _check_limit(run: Run) -> None:
     request = run.request
     if run.faces > request.max_faces:
         raise LimitError(
-            f"{request.source}: level {request.level} gives {run.faces:,} faces, more than the limit of "
-            f"{request.max_faces:,}; choose a lower level or raise --max-faces"
+            f"{request.source}: {run.surface.amount(request.level)} gives {run.faces:,} faces, more than the limit of "
+            f"{request.max_faces:,}; choose less or raise --max-faces"
         )
 
 
 def _tell_prediction(run: Run, console: Console) -> None:
-    request, patches = run.request, run.written.patches
-    layout = dense_layout(patches, number_dense_mesh(patches, request.level), run.dtype)
+    request = run.request
+    layout = run.written.layout(request.level, run.dtype)
     bytes_ = predicted_bytes(layout, run.format, request.ascii, run.triangulate)
-    console.tell(f"{request.source}: {_sizes(patches.counts)}")
+    console.tell(f"{request.source}: {_sizes(run.surface.counts)}")
     console.tell(f"{request.target} would have {_dense_sizes(run, layout)}, about {size(bytes_)}")
 
 
 def _refine(run: Run, console: Console) -> None:
     request = run.request
     options = ", ".join(f"{name} {value}" for name, value in plain_options(run.options).items())
-    console.explain(f"{request.source}: {_sizes(run.surface.patches.counts)}")
-    console.explain(f"scheme {request.scheme}, level {request.level}, {options}, {run.dtype.name}")
-    for source, counts in run.surface.patches.marks.items():
+    console.explain(f"{request.source}: {_sizes(run.surface.counts)}")
+    console.explain(f"scheme {request.scheme}, {run.surface.amount(request.level)}, {options}, {run.dtype.name}")
+    for source, counts in run.surface.marks.items():
         console.explain(f"{source}: {', '.join(count_of(number, kind) for kind, number in counts.items())}")
-    recorder = Recorder(run.surface.patches) if request.report is not None else None
+    recorder = Recorder(run.surface) if request.report is not None else None
     with ExitStack() as stack:
         with timed(run.seconds, "open_backend"):
-            backend = stack.enter_context(open_backend(request.backend, run.surface.face_count(request.level)))
+            samples = run.surface.face_count(request.level)
+            backend = stack.enter_context(run.surface.open_backend(request.backend, samples))
         run.backend = backend.describe()
         console.explain(f"backend {_backend_name(run.backend)}, {count_of(run.threads, 'thread')}")
         with timed(run.seconds, "evaluate_and_write"):

@@ -20,8 +20,8 @@ EXAMPLES = (
 def command(as_json: bool) -> None:
     """List the surface schemes and their options.
 
-    For each scheme: the faces it takes, how smoothly the surface continues across their edges, the normals it offers,
-    its options with their defaults, and the paper that it comes from.
+    For each scheme: the faces it takes, what of the mesh it keeps, how smoothly the surface continues across their
+    edges, the normals it offers, its options with their defaults, and the paper that it comes from.
     """
     schemes = [describe(name) for name in scheme_names()]
     if as_json:
@@ -53,6 +53,7 @@ def describe(name: str) -> dict[str, Any]:
         "name": module.name,
         "summary": module.summary,
         "faces": module.faces,
+        "keeps": module.keeps,
         "continuity": module.continuity,
         "normals": list(module.normals),
         "options": {**own, **{name: value for name, value in shared.items() if value is not None}},
@@ -65,6 +66,7 @@ def as_text(scheme: dict[str, Any]) -> str:
     choices = [f"--{name.replace('_', '-')} {value}" for name, value in scheme["options"].items()]
     rows = [
         ("faces", scheme["faces"]),
+        ("keeps", scheme["keeps"]),
         ("continuity", scheme["continuity"]),
         ("normals", ", ".join(scheme["normals"])),
         ("options", ("\n" + " " * 14).join(choices)),

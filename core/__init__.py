@@ -5,7 +5,8 @@
 >>> dense = curvify.refine(mesh, scheme="gregory", level=5)
 >>> curvify.write(dense, "dense.ply")
 
-``curvify.surface(mesh)`` gives an object that evaluates position and normal anywhere.
+``curvify.surface(mesh)`` gives an object that evaluates position and normal anywhere, ``curvify.refinable(mesh,
+scheme)`` one of any scheme that writes straight to files.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from curvify.inspection import describe
     from curvify.mesh import DenseMesh, Marks, PolygonMesh
     from curvify.pieces import split_mesh
-    from curvify.refinement import Surface, refine, surface
+    from curvify.refinement import Refinable, Surface, refinable, refine, surface
     from curvify.repair import repair_mesh
 
 _WHERE = {
@@ -36,12 +37,14 @@ _WHERE = {
     "DenseMesh": "mesh",
     "Marks": "mesh",
     "PolygonMesh": "mesh",
+    "Refinable": "refinement",
     "Surface": "refinement",
     "check_mesh": "checks",
     "compare_meshes": "compare",
     "compare_surfaces": "compare",
     "describe": "inspection",
     "deviations": "deviation",
+    "refinable": "refinement",
     "refine": "refinement",
     "repair_mesh": "repair",
     "split_mesh": "pieces",
@@ -58,6 +61,7 @@ __all__ = [
     "MeshError",
     "OptionError",
     "PolygonMesh",
+    "Refinable",
     "Surface",
     "__version__",
     "check_mesh",
@@ -66,6 +70,7 @@ __all__ = [
     "describe",
     "deviations",
     "read",
+    "refinable",
     "refine",
     "repair_mesh",
     "split_mesh",

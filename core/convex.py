@@ -70,6 +70,13 @@ class Split:
         return {name: int(faces[0]) for name, faces in hits.items() if len(faces)}
 
 
+def whole_faces(face_offsets: Ints, face_vertices: Ints) -> Split:
+    """Every face as one piece."""
+    offsets, vertices = np.asarray(face_offsets, dtype=np.int64), np.asarray(face_vertices, dtype=np.int64)
+    reasons = np.zeros(len(offsets) - 1, dtype=np.uint8)
+    return cut_along(offsets, vertices, np.zeros((0, 2), dtype=np.int64), reasons)
+
+
 def split_polygons(
     positions: Floats, face_offsets: Ints, face_vertices: Ints, *, rule: str = "best", max_sides: int = 64
 ) -> Split:
@@ -94,7 +101,7 @@ def split_polygons(
             reasons[group.faces] = np.where(group.simple, shape, KEYHOLE)
         edges = _edges_between(offsets, vertices, np.concatenate([group.ids.ravel() for group in groups]))
         pairs = _cut_groups(groups, edges, reasons, rule, max_sides)
-    return _assemble(offsets, vertices, pairs, reasons)
+    return cut_along(offsets, vertices, pairs, reasons)
 
 
 def _faces_to_split(positions: Floats, offsets: Ints, vertices: Ints, max_sides: int) -> list[Group]:
@@ -228,7 +235,7 @@ def split_at_corners(positions: Floats, split: Split, bad_corners: Bools, corner
     reasons[split.source_faces[pieces]] |= FOLDED
     source_vertices = np.zeros(int(split.source_offsets[-1]), dtype=np.int64)
     source_vertices[split.source_corners] = vertices
-    return _assemble(split.source_offsets, source_vertices, np.concatenate(found), reasons)
+    return cut_along(split.source_offsets, source_vertices, np.concatenate(found), reasons)
 
 
 def _old_pairs(split: Split) -> Ints:
@@ -294,8 +301,8 @@ def _sines(leave: Floats, back: Floats, normal: Floats) -> Floats:
     return dot_rows(cross_rows(leave, back), normal) / np.maximum(lengths, 1e-300)
 
 
-def _assemble(offsets: Ints, vertices: Ints, pairs: Ints, reasons: Ints) -> Split:
-    """Build the pieces that the diagonals ``pairs (D,2)``, of source corners, make of the faces."""
+def cut_along(offsets: Ints, vertices: Ints, pairs: Ints, reasons: Ints) -> Split:
+    """The pieces that the diagonals ``pairs (D,2)``, of source corners, make of the faces; they must not cross."""
     corner_count, sizes = len(vertices), np.diff(offsets)
     owner = np.repeat(np.arange(len(sizes)), sizes)
     cut = np.zeros(len(sizes), dtype=bool)

@@ -7,6 +7,8 @@ arithmetic, so that equal ends give equal bits wherever the edge stands in the m
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from curvify.mesh import Floats
@@ -18,6 +20,11 @@ LEAST_ADVANCE = 0.05
 OPPOSITE = -0.99
 #: A normal whose part across the edge is below this lies along it.
 ALONG = 1e-3
+#: A chord whose projection along a normal is shorter than this share of it has none.
+NO_PROJECTION = 1e-9
+
+#: Unit tangents ``(E,3)`` at edge ends from chords, end normals and bending normals.
+Directions = Callable[[Floats, Floats, Floats], Floats]
 
 
 def bending_normals(chord: Floats, start_normal: Floats, end_normal: Floats, face_normal: Floats) -> Floats:
@@ -58,6 +65,18 @@ def smooth_tangents(chord: Floats, normal: Floats, bending: Floats) -> Floats:
     flat = np.linalg.norm(projected, axis=-1, keepdims=True) < ALONG
     fallback = np.where(flat, along, unit(projected))
     return np.where(dot(tangent, along) <= LEAST_ADVANCE, fallback, tangent)
+
+
+def projected_tangents(chord: Floats, normal: Floats, bending: Floats) -> Floats:
+    """Unit tangent ``(E,3)`` at an edge end: the chord projected along the end normal, whatever the edge bends in.
+
+    The direction that PN triangles and their kin take (Vlachos et al. 2001); the chord's own where the normal lies
+    along it. ``bending`` is not used.
+    """
+    along = unit(chord)
+    projected = along - dot(along, normal) * normal
+    flat = np.linalg.norm(projected, axis=-1, keepdims=True) <= NO_PROJECTION
+    return np.where(flat, along, unit(projected))
 
 
 def tangent_lengths(chord: Floats, tangent: Floats, rule: str) -> Floats:

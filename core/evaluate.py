@@ -20,7 +20,7 @@ from curvify.arrays import as_slice, unit_rows
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import unit
 from curvify.sampling import Sampling
-from curvify.schemes.base import Basis, Controls, Form, PatchClass, Patches, bernstein_basis
+from curvify.schemes.base import Basis, Controls, Form, LinearControls, PatchClass, Patches, bernstein_basis
 from curvify.schemes.domain import domain_jets
 from curvify.tables import TAIL, Tables, chebyshev_points
 
@@ -102,6 +102,9 @@ def fill_patches(
     if patch_class.normals is not None:
         for place, values in _evaluate_form(patch_class.normals, rows, sampling.points, grid, tolerance, 1):
             _store(normals, place, unit_rows(values[0]))
+        lost = np.nonzero(~normals.any(axis=2))  # where the blend of opposite normals vanishes
+        if len(lost[0]):
+            normals[lost] = blended_normals(patches, patch_class.patches[rows[lost[0]]], sampling.points[lost[1]])
 
 
 def _store(out: Floats, place: tuple[Ints, slice], values: Floats) -> None:
@@ -140,6 +143,11 @@ def _evaluate_form(
     """Values ``(o,3,f,S)`` of a form, with the index of the patches and samples they belong to."""
     left = np.arange(len(rows))
     controls = form.controls(rows)
+    if isinstance(controls, LinearControls):  # one table serves all
+        nodes = controls.fields(chebyshev_points(tables.NODE_COUNTS[0]))
+        key = (grid, tables.NODE_COUNTS[0], orders)
+        yield from _by_tables(form, controls.linear, nodes, left, points, key)
+        return
     exact = grid[0] >= MANY_SIDES or len(points) <= FEW_SAMPLES
     for count in () if exact else tables.NODE_COUNTS:
         nodes = controls.fields(chebyshev_points(count))

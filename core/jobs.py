@@ -15,7 +15,7 @@ import numpy as np
 from curvify.arrays import as_slice
 from curvify.backends import Backend
 from curvify.errors import OptionError
-from curvify.mesh import Floats, Ints
+from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.schemes.base import PatchClass, Patches
 from curvify.sectors import sides_of_edges
 from curvify.sinks import DenseLayout, Sink
@@ -32,24 +32,28 @@ PATCH = 64
 SERIES_TOLERANCE = {"float32": 1e-9, "float64": 1e-14}
 
 
-def dense_layout(patches: Patches, numbering: Numbering, dtype: np.dtype[Any]) -> DenseLayout:
-    """Shape of the dense mesh in an output type; raises OptionError unless that is float32 or float64."""
+def vertex_type(mesh: PolygonMesh, uvs: bool, dtype: np.dtype[Any]) -> np.dtype[np.void]:
+    """The record of a wedge in an output type; raises OptionError unless that is float32 or float64."""
     if dtype.name not in SERIES_TOLERANCE:
         raise OptionError(f"the precision must be float32 or float64, not {dtype}")
     kind = dtype.newbyteorder("<")
     fields: list[tuple[Any, ...]] = [("position", kind, 3), ("normal", kind, 3)]
-    if numbering.uvs is not None:
+    if uvs:
         fields.append(("uv", kind, 2))
-    colors = patches.mesh.vertex_colors
+    colors = mesh.vertex_colors
     if colors is not None:
         fields.append(("color", colors.dtype if colors.dtype == np.uint8 else kind, colors.shape[1]))
-    cell_size = next(iter(numbering.samplings.values())).cells.shape[1]
+    return np.dtype(fields)
+
+
+def dense_layout(patches: Patches, numbering: Numbering, dtype: np.dtype[Any]) -> DenseLayout:
+    """Shape of the dense mesh in an output type; raises OptionError unless that is float32 or float64."""
     return DenseLayout(
         numbering.vertex_count,
         repeat_vertices(numbering, patches),
         numbering.face_count,
-        cell_size,
-        np.dtype(fields),
+        next(iter(numbering.samplings.values())).cells.shape[1],
+        vertex_type(patches.mesh, numbering.uvs is not None, dtype),
         patches.mesh,
     )
 
@@ -163,7 +167,7 @@ class _Evaluation:
         second = np.where(low, topology.next[half_edges], half_edges)
         for name, values in self._carried():
             a, b = values[first][:, None], values[second][:, None]
-            _assign(records[name], a * (1 - t)[:, None] + b * t[:, None])
+            assign(records[name], a * (1 - t)[:, None] + b * t[:, None])
         return records.reshape(-1)
 
     def _carried(self) -> Iterator[tuple[str, Floats]]:
@@ -209,7 +213,7 @@ class _Evaluation:
         )
         corners = self.patches.topology.offsets[patch_class.patches[rows]][:, None] + np.arange(patch_class.sides)
         for name, values in self._carried():
-            _assign(target[name], np.einsum("sn,fnc->fsc", sampling.blend, values[corners]))
+            assign(target[name], np.einsum("sn,fnc->fsc", sampling.blend, values[corners]))
         if not together:
             records[(places[:, None] + np.arange(samples)).reshape(-1)] = target.reshape(-1)
 
@@ -246,6 +250,6 @@ class _Evaluation:
         sink.faces(int(self.numbering.cell_starts[first]), cells, source_faces)
 
 
-def _assign(target: np.ndarray[Any, Any], values: Floats) -> None:
+def assign(target: np.ndarray[Any, Any], values: Floats) -> None:
     """Store carried values, rounded where the target is an integer."""
     target[...] = np.rint(values) if target.dtype.kind in "iu" else values

@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from curvify.edges import edge_curves
+from curvify.edges import Directions, edge_curves, smooth_tangents
 from curvify.errors import MeshError
 from curvify.marks import ResolvedMarks, explicit_marks, found_marks, gather_marks, hole_faces
 from curvify.mesh import Bools, Floats, Ints, Marks, PolygonMesh
@@ -34,6 +34,8 @@ from curvify.words import count_of
 
 #: Coordinates beyond this would overflow when they are multiplied, or in float32 files.
 LARGEST_COORDINATE = 1e30
+#: Given normals whose squared length is off 1 by no more than this, 4 units in the last place, are left as they are.
+UNIT = 8 * float(np.finfo(np.float64).eps)
 
 
 @record
@@ -60,12 +62,22 @@ class Coarse:
     warnings: list[str] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
 
-    def features(self, corners: Bools | None = None) -> Features:
-        """Normals and end tangents, with the vertices ``corners (V,)`` as corners besides those that are marked."""
+    def features(self, corners: Bools | None = None, directions: Directions = smooth_tangents) -> Features:
+        """Normals and end tangents, with the vertices ``corners (V,)`` as corners besides those that are marked;
+        ``directions`` as in ``resolve_features``.
+        """
         if corners is None:
             corners = np.zeros(len(self.positions), dtype=bool)
         return resolve_features(
-            self.topology, self.positions, self.area, self.fans, self.sectors, self.given, self.marks, corners
+            self.topology,
+            self.positions,
+            self.area,
+            self.fans,
+            self.sectors,
+            self.given,
+            self.marks,
+            corners,
+            directions,
         )
 
     def note_features(self, features: Features) -> tuple[dict[str, int], list[str]]:
@@ -245,7 +257,8 @@ def _given_normals(
     if mesh.corner_normals is None:
         return GivenNormals(None, [])
     given = np.nan_to_num(mesh.corner_normals[loops.source_corners], posinf=0.0, neginf=0.0)
-    given = unit(given / np.maximum(np.abs(given).max(axis=1, keepdims=True), 1e-300))
+    off = np.flatnonzero(np.abs(np.einsum("ci,ci->c", given, given) - 1) > UNIT)
+    given[off] = unit(given[off] / np.maximum(np.abs(given[off]).max(axis=1, keepdims=True), 1e-300))
     present = given.any(axis=1)
     if not present.any():
         return GivenNormals(None, [])

@@ -7,7 +7,10 @@ take jobs in order; a sink that can write anywhere takes blocks as they come, th
 from __future__ import annotations
 
 import os
-from contextlib import nullcontext
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,15 +25,136 @@ from curvify.records import field, record, replaced
 from curvify.schemes import load_scheme
 from curvify.schemes.base import Patches
 from curvify.sinks import ArraySink, DenseLayout, Sink
-from curvify.threads import Progress, run_jobs
+from curvify.threads import Job, Progress, run_jobs
+from curvify.topology import Topology
 from curvify.weld import cell_sources, number_dense_mesh, predict_faces
 
 #: Faces that a dense mesh may have unless the caller allows more.
 MAX_FACES = 50_000_000
 
+#: The jobs of a dense mesh for a backend, in order, each with its number of samples.
+JobsFor = Callable[[Backend], list[tuple[int, Job]]]
+
+
+class Refinable(ABC):
+    """What a scheme makes of a polygon mesh: it can be refined into arrays, a sink or a file.
+
+    ``positions (V,3)`` of the input's vertices, ``topology``, ``counts`` and the number of ``marks`` by source and kind
+    tell of the mesh, ``cell_size`` of the dense faces' corners.
+    """
+
+    warnings: list[str]
+
+    @property
+    @abstractmethod
+    def positions(self) -> Floats: ...
+
+    @property
+    @abstractmethod
+    def topology(self) -> Topology: ...
+
+    @property
+    @abstractmethod
+    def counts(self) -> dict[str, int]: ...
+
+    @property
+    @abstractmethod
+    def marks(self) -> dict[str, dict[str, int]]: ...
+
+    @property
+    @abstractmethod
+    def cell_size(self) -> int: ...
+
+    @abstractmethod
+    def face_count(self, level: int, enough: int | None = None) -> int:
+        """Faces of the dense mesh at a level; some number above ``enough`` if there are more than that."""
+
+    @abstractmethod
+    def amount(self, level: int) -> str:
+        """The level in words."""
+
+    @abstractmethod
+    def _work(self, level: int, dtype: np.dtype[Any]) -> tuple[DenseLayout, JobsFor]:
+        """Layout of the dense mesh, and its jobs for a backend."""
+
+    def open_backend(self, name: str, samples: int) -> AbstractContextManager[Backend]:
+        """The backend of a name that can evaluate this, for about so many samples; see ``backends``."""
+        return open_backend(name, samples)
+
+    def weld_normals(self) -> Refinable:
+        """The same with one normal for every vertex of the dense mesh, also on creases.
+
+        Raises OptionError for a scheme whose normals shape its next pass.
+        """
+        raise OptionError("--weld-normals is for schemes that make a surface; overveld needs its normals")
+
+    def layout(self, level: int, dtype: np.dtype[Any]) -> DenseLayout:
+        """The shape of the dense mesh."""
+        return self._work(level, dtype)[0]
+
+    def refine(self, level: int = 5, dtype: object = np.float64, **run: Any) -> DenseMesh:
+        """The dense mesh of level k as arrays; see ``stream`` for the other options."""
+        sink = ArraySink()
+        self.stream(sink, level, dtype, **run)
+        return sink.dense_mesh()
+
+    def stream(
+        self,
+        sink: Sink,
+        level: int = 5,
+        dtype: object = np.float64,
+        threads: int | None = None,
+        max_faces: int = MAX_FACES,
+        progress: Progress | None = None,
+        backend: str | Backend = "cpu",
+    ) -> DenseLayout:
+        """Evaluate the dense mesh of level k into a sink, block by block.
+
+        ``dtype`` float32 or float64 is the type of positions, normals and texture coordinates; ``threads`` (default:
+        one per processor) does not change the result; ``progress(done, of)`` is told about samples; ``backend`` is an
+        open one, or ``cpu``, ``gpu`` or ``auto``. Raises OptionError for a level below 1, LimitError for more faces
+        than ``max_faces``, DeviceError for ``gpu`` where there is none.
+        """
+        if int(level) != level or level < 1:
+            raise OptionError(f"the level must be a whole number from 1 on, not {level!r}")
+        faces = self.face_count(int(level), max_faces)
+        if faces > max_faces:
+            raise LimitError(
+                f"{self.amount(int(level))} gives {faces:,} faces, more than the limit of {max_faces:,}; "
+                "choose less or raise --max-faces"
+            )
+        layout, jobs_for = self._work(int(level), np.dtype(dtype))  # type: ignore[call-overload]
+        opened = self.open_backend(backend, layout.vertex_count) if isinstance(backend, str) else nullcontext(backend)
+        with opened as evaluator:
+            jobs = jobs_for(evaluator)
+            sink.begin(layout)
+            run_jobs(jobs, sink, threads, progress)
+            sink.end()
+        return layout
+
+    def write(
+        self,
+        path: str | os.PathLike[str],
+        level: int = 5,
+        dtype: object = np.float32,
+        *,
+        format: str | None = None,
+        ascii: bool = False,
+        triangulate: bool = False,
+        **run: Any,
+    ) -> DenseLayout:
+        """Refine straight into a file, which is complete or not there; see ``stream`` for the options in ``run``.
+
+        ``ascii`` is for PLY; ``triangulate`` cuts quads. Raises FormatError where the file cannot be written.
+        """
+        from curvify.formats.dense import dense_output
+
+        with dense_output(path, format, ascii=ascii, triangulate=triangulate) as sink:
+            return self.stream(sink, level, dtype, **run)
+
 
 @record
-class Surface:
+class Surface(Refinable):
     """A surface over a polygon mesh, ready to be evaluated anywhere or refined.
 
     ``patches`` hold one patch for each face, or several for a face that had to be split; patch ``p`` belongs to
@@ -78,75 +202,65 @@ class Surface:
 
         return replaced(self, patches=weld_normals(self.patches))
 
-    def face_count(self, level: int) -> int:
+    @property
+    def positions(self) -> Floats:
+        """Positions ``(V,3)`` of the input's vertices."""
+        return self.patches.positions
+
+    @property
+    def topology(self) -> Topology:
+        """Topology of the patches."""
+        return self.patches.topology
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Counts for the report."""
+        return self.patches.counts
+
+    @property
+    def marks(self) -> dict[str, dict[str, int]]:
+        """Number of marks by source and kind."""
+        return self.patches.marks
+
+    @property
+    def cell_size(self) -> int:
+        """Corners of the dense mesh's faces."""
+        return int(self.patches.sampling(self.patches.classes[0].sides, 1).cells.shape[1])
+
+    def amount(self, level: int) -> str:
+        """The level in words."""
+        return f"level {level}"
+
+    def face_count(self, level: int, enough: int | None = None) -> int:
         """Faces of the dense mesh at a level."""
         return predict_faces(self.patches, level)
 
     def refine(self, level: int = 5, dtype: object = np.float64, **run: Any) -> DenseMesh:
-        """The dense mesh of level k as arrays; see ``stream`` for the other options."""
-        sink = ArraySink()
-        self.stream(sink, level, dtype, **run)
-        dense = sink.dense_mesh()
+        """The dense mesh of level k as arrays, its faces with their places on the patches; see ``stream``."""
+        dense = super().refine(level, dtype, **run)
         dense.source_patches, dense.source_parameters = cell_sources(self.patches, level)
         return dense
 
-    def stream(
-        self,
-        sink: Sink,
-        level: int = 5,
-        dtype: object = np.float64,
-        threads: int | None = None,
-        max_faces: int = MAX_FACES,
-        progress: Progress | None = None,
-        backend: str | Backend = "cpu",
-    ) -> DenseLayout:
-        """Evaluate the dense mesh of level k into a sink, block by block.
-
-        ``dtype`` float32 or float64 is the type of positions, normals and texture coordinates; ``threads`` (default:
-        one per processor) does not change the result; ``progress(done, of)`` is told about samples; ``backend`` is an
-        open one, or ``cpu``, ``gpu`` or ``auto``. Raises OptionError for a level below 1, LimitError for more faces
-        than ``max_faces``, DeviceError for ``gpu`` where there is none.
-        """
-        if int(level) != level or level < 1:
-            raise OptionError(f"the level must be a whole number from 1 on, not {level!r}")
-        faces = self.face_count(int(level))
-        if faces > max_faces:
-            raise LimitError(
-                f"level {level} gives {faces:,} faces, more than the limit of {max_faces:,}; "
-                "choose a lower level or raise --max-faces"
-            )
-        numbering = number_dense_mesh(self.patches, int(level))
-        layout = dense_layout(self.patches, numbering, np.dtype(dtype))  # type: ignore[call-overload]
-        opened = open_backend(backend, layout.vertex_count) if isinstance(backend, str) else nullcontext(backend)
-        with opened as evaluator:
-            sink.begin(layout)
-            run_jobs(dense_jobs(self.patches, numbering, layout, evaluator), sink, threads, progress)
-            sink.end()
-        return layout
-
-    def write(
-        self,
-        path: str | os.PathLike[str],
-        level: int = 5,
-        dtype: object = np.float32,
-        *,
-        format: str | None = None,
-        ascii: bool = False,
-        triangulate: bool = False,
-        **run: Any,
-    ) -> DenseLayout:
-        """Refine straight into a file, which is complete or not there; see ``stream`` for the options in ``run``.
-
-        ``ascii`` is for PLY; ``triangulate`` cuts quads. Raises FormatError where the file cannot be written.
-        """
-        from curvify.formats.dense import dense_output
-
-        with dense_output(path, format, ascii=ascii, triangulate=triangulate) as sink:
-            return self.stream(sink, level, dtype, **run)
+    def _work(self, level: int, dtype: np.dtype[Any]) -> tuple[DenseLayout, JobsFor]:
+        """Layout of the dense mesh, and its jobs for a backend."""
+        numbering = number_dense_mesh(self.patches, level)
+        layout = dense_layout(self.patches, numbering, dtype)
+        return layout, partial(dense_jobs, self.patches, numbering, layout)
 
 
 def surface(mesh: PolygonMesh, scheme: str = "gregory", **options: Any) -> Surface:
-    """The surface of a scheme over a mesh; ``options`` are the scheme's. Raises CurvifyError."""
+    """The surface of a scheme over a mesh; ``options`` are the scheme's.
+
+    Raises OptionError for a recursive scheme, which has no surface, other CurvifyErrors as ``refinable``.
+    """
+    made = refinable(mesh, scheme, **options)
+    if not isinstance(made, Surface):
+        raise OptionError(f"the scheme {scheme} makes meshes, not a surface; use curvify.refine")
+    return made
+
+
+def refinable(mesh: PolygonMesh, scheme: str = "gregory", **options: Any) -> Refinable:
+    """What a scheme makes of a mesh; ``options`` are the scheme's. Raises CurvifyError."""
     module = load_scheme(scheme)
     try:
         chosen = module.Options(**options)
@@ -154,8 +268,12 @@ def surface(mesh: PolygonMesh, scheme: str = "gregory", **options: Any) -> Surfa
         known = ", ".join(sorted(module.Options.__dataclass_fields__))
         wrong = ", ".join(sorted(set(options) - set(module.Options.__dataclass_fields__)))
         raise OptionError(f"the scheme {scheme} has no option {wrong}; it has {known}") from None
-    patches = module.prepare(mesh, chosen)
-    return Surface(patches, scheme, list(patches.warnings))
+    made = module.prepare(mesh, chosen)
+    if isinstance(made, Patches):
+        return Surface(made, scheme, list(made.warnings))
+    from curvify.subdivision import Subdivision
+
+    return Subdivision(made, scheme)
 
 
 def refine(
@@ -175,7 +293,7 @@ def refine(
     ``curvify.schemes``); the others as in ``Surface.stream``. Raises CurvifyError where the mesh or an option cannot
     be used.
     """
-    made = surface(mesh, scheme, **options)
+    made = refinable(mesh, scheme, **options)
     if weld_normals:
         made = made.weld_normals()
     return made.refine(level, dtype, threads=threads, max_faces=max_faces, backend=backend)

@@ -9,6 +9,7 @@ points of one patch in this order. No basis values here: the same sampling serve
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -71,6 +72,49 @@ def kite_sampling(sides: int, level: int) -> Sampling:
     for array in (points, weights, cells, centers):
         array.setflags(write=False)
     return Sampling(n, inner, points, weights, cells, centers)
+
+
+@lru_cache(maxsize=64)
+def triangle_sampling(sides: int, level: int) -> Sampling:
+    """A triangle cut into (2 level)^2 triangles by lines parallel to its sides, row by row from side 0.
+
+    Row j holds the points with third barycentric coordinate j/n, n = 2 level; ``blend`` are these coordinates. There is
+    nothing for any other number of ``sides``.
+    """
+    n = segments(level)
+    row, column = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
+    weights = np.stack([n - row - column, column, row], axis=-1) / n
+    inside = (row > 0) & (column > 0) & (row + column < n)
+    local = _lattice_indices(n)
+    up = [(slice(0, n), slice(0, n)), (slice(0, n), slice(1, n + 1)), (slice(1, n + 1), slice(0, n))]
+    down = [up[1], (slice(1, n + 1), slice(1, n + 1)), up[2]]
+    fits = np.stack([(row + column)[:-1, :-1] < n, (row + column)[:-1, :-1] < n - 1], axis=-1)
+
+    def both(grid: Any) -> Any:
+        """Values of the lattice at the corners of its triangles, the upright one of each square first."""
+        halves = [np.stack([grid[place] for place in triangle], axis=2) for triangle in (up, down)]
+        return np.stack(halves, axis=2)[fits]
+
+    cells, middles, weights = both(local), both(weights).mean(axis=1), weights[inside]
+    corners = domain_corners(sides)
+    points, centers = weights @ corners, middles @ corners
+    for array in (points, weights, cells, centers):
+        array.setflags(write=False)
+    return Sampling(sides, n - 1, points, weights, cells, centers)
+
+
+def _lattice_indices(n: int) -> Ints:
+    """Local index ``(n+1,n+1)`` of the lattice points of a triangle by row and column; -1 outside of it."""
+    local = np.full((n + 1, n + 1), -1, dtype=np.int64)
+    step = np.arange(1, n)
+    local[0, 0], local[0, n], local[n, 0] = 0, 1, 2
+    local[0, step] = 3 + step - 1
+    local[step, n - step] = 3 + (n - 1) + step - 1
+    local[step, 0] = 3 + 2 * (n - 1) + (n - step) - 1
+    row, column = (grid.ravel() for grid in np.meshgrid(step, step, indexing="ij"))
+    inside = row + column < n
+    local[row[inside], column[inside]] = 3 * n + np.arange(inside.sum())
+    return local
 
 
 def _kite_weights(n: int, corner: int, a: Floats, b: Floats) -> Floats:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from curvify.arrays import cross, distinct, take_rows
-from curvify.edges import ALONG, LEAST_ADVANCE, bending_normals, smooth_tangents
+from curvify.edges import ALONG, LEAST_ADVANCE, Directions, bending_normals, smooth_tangents
 from curvify.marks import ResolvedMarks
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import SAME_NORMAL, degrees_between, dot, perpendicular, sector_normals, sum_by, unit
@@ -36,7 +36,8 @@ class Features:
     ``normals (C,3)`` unit, one per face corner, bitwise equal within a sector; ``tangents (E,2,3)`` unit
     directions along the canonical direction at the two ends of each edge; ``bending (E,3)`` normal of the
     plane each edge bends in; ``sharp (E,2)`` where the faces' normals differ at an end of an interior edge;
-    ``corners (V,)`` the corner vertices; ``adjusted``, how many corners could not keep their normal.
+    ``corners (V,)`` the corner vertices; ``adjusted``, how many corners could not keep their normal; ``unfitted
+    (C,3)`` the sectors' normals as they were before they were made perpendicular to the curves.
     """
 
     normals: Floats
@@ -45,6 +46,7 @@ class Features:
     sharp: Bools
     corners: Bools
     adjusted: int
+    unfitted: Floats
 
 
 def label_sectors(topology: Topology, fans: Ints, crease: Floats) -> Ints:
@@ -70,11 +72,13 @@ def resolve_features(
     given: Floats | None,
     marks: ResolvedMarks,
     corners: Bools,
+    directions: Directions = smooth_tangents,
 ) -> Features:
     """Resolve normals and tangents from the ``given (C,3)`` unit corner normals and the marks.
 
     ``area (F,3)`` are the faces' area vectors, ``fans`` and ``sectors (C,)`` label the corners. Rows of ``given`` are
     zero where the normal is to be computed; None: everywhere. ``corners (V,)`` are vertices that must be corners.
+    ``directions`` is the scheme's rule for edge ends where nothing is sharp and no mark bends the edge.
     """
     normals, computed = _starting_normals(topology, positions, area, sectors, given, marks)
     sharp = _sharp_ends(topology, sectors)
@@ -90,9 +94,9 @@ def resolve_features(
     if ((marks.crease > 0) & (marks.crease < 1)).any():
         _soften(topology, normals, fans, sectors, sharp, marks.crease)
         straight.apply(normals)
-    tangents, bending = _end_tangents(topology, positions, area, normals, lines, sharp, corners, marks)
-    normals, adjusted = _fit_normals(topology, normals, tangents, corners)
-    return Features(normals, tangents, bending, sharp, corners, adjusted)
+    tangents, bending = _end_tangents(topology, positions, area, normals, lines, sharp, corners, marks, directions)
+    fitted, adjusted = _fit_normals(topology, normals, tangents, corners)
+    return Features(fitted, tangents, bending, sharp, corners, adjusted, normals)
 
 
 def _straighten_lines(
@@ -125,7 +129,7 @@ def _starting_normals(
     everywhere = np.ones(len(sectors), dtype=bool)
     if given is None:
         return sector_normals(positions, topology.offsets, topology.vertices, area, sectors, marks.flat), everywhere
-    normals = unit(sum_by(sectors, given, len(sectors)))[sectors]
+    normals = _means(sectors, given)
     wanted = np.zeros(len(sectors), dtype=bool)
     wanted[sectors[~normals.any(axis=1)]] = True
     wanted[sectors[np.repeat(marks.flat, topology.sizes)]] = True
@@ -141,6 +145,17 @@ def _starting_normals(
         own = sector_normals(positions, topology.offsets, topology.vertices, area, sectors, marks.flat)
         normals[computed] = own[computed]
     return normals, computed
+
+
+def _means(sectors: Ints, given: Floats) -> Floats:
+    """Mean ``(C,3)`` of the given unit normals of each sector; bit by bit the normal itself where they are equal."""
+    lead = take_rows(given, sectors)  # a sector is labeled by its first corner
+    differs = np.zeros(len(sectors), dtype=bool)
+    differs[sectors[(given != lead).any(axis=1)]] = True
+    if not differs.any():
+        return lead
+    means = unit(sum_by(sectors, given, len(sectors)))[sectors]
+    return np.where(differs[sectors][:, None], means, lead)
 
 
 @record
@@ -282,6 +297,7 @@ def _end_tangents(
     sharp: Bools,
     corners: Bools,
     marks: ResolvedMarks,
+    directions: Directions,
 ) -> tuple[Floats, Floats]:
     """Unit tangents ``(E,2,3)`` and bending normals ``(E,3)`` of all edges."""
     chord = take_rows(positions, topology.edges[:, 1]) - take_rows(positions, topology.edges[:, 0])
@@ -299,7 +315,8 @@ def _end_tangents(
     tangents = np.empty((len(chord), 2, 3))
     for end in (0, 1):
         at = topology.edges[:, end]
-        tangents[:, end] = smooth_tangents(chord, mean[:, end], bending)
+        tangents[:, end] = directions(chord, mean[:, end], bending)
+        tangents[bent, end] = smooth_tangents(chord[bent], mean[bent, end], bending[bent])
         split = np.flatnonzero(sharp[several, end])
         rows = several[split]
         along = unit(chord[rows])

@@ -190,7 +190,7 @@ def build_topology(positions: Floats, offsets: Ints, vertices: Ints) -> Topology
 
 def link_half_edges(positions: Floats, offsets: Ints, vertices: Ints, edges: Ints, edge: Ints) -> Topology:
     """Topology where the edge of each half-edge ``edge (C,)`` is known; ``edges (E,2)`` in any direction."""
-    edges = _canonical(positions, edges)
+    edges = canonical_direction(positions, edges)
     forward = vertices == edges[edge, 0]
     uses = np.bincount(edge, minlength=len(edges))
     ups = np.bincount(edge[forward], minlength=len(edges))
@@ -205,7 +205,7 @@ def link_half_edges(positions: Floats, offsets: Ints, vertices: Ints, edges: Int
     )
 
 
-def _canonical(positions: Floats, edges: Ints) -> Ints:
+def canonical_direction(positions: Floats, edges: Ints) -> Ints:
     """The edges ``(E,2)`` turned so that each starts at its lexicographically smaller position, ties by id."""
     low, high = np.minimum(edges[:, 0], edges[:, 1]), np.maximum(edges[:, 0], edges[:, 1])
     step = positions[high] - positions[low]

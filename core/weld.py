@@ -165,12 +165,22 @@ def corner_colors(patches: Patches) -> Floats | None:
 
 def _corner_wedges(patches: Patches, carried: Floats | None, total: int) -> tuple[Ints, Ints, Ints]:
     """Wedge of each corner, base corner of each vertex, and a corner for each repeat."""
-    vertices, count = patches.topology.vertices, len(patches.positions)
+    vertices = patches.topology.vertices
     rows = patches.normals if carried is None else np.concatenate([patches.normals, carried], axis=1)
+    own = np.flatnonzero(patches.mesh.face_vertices[patches.source_corners] == vertices)
+    return split_wedges(vertices, rows, own, len(patches.positions), total)
+
+
+def split_wedges(vertices: Ints, rows: Floats, own: Ints, count: int, total: int) -> tuple[Ints, Ints, Ints]:
+    """Wedge ``(C,)`` of each corner, base corner ``(count,)`` of each vertex (-1: none), and a corner for each repeat.
+
+    Corners of one of the ``vertices (C,)`` are one wedge where their ``rows (C,c)`` are equal; that of the base corner
+    is the vertex itself, the others are numbered from ``total`` on. ``own`` are corners of the vertex itself, not of a
+    copy welded to it.
+    """
     base = np.full(count, len(vertices))
     np.minimum.at(base, vertices, np.arange(len(vertices)))
-    own = np.flatnonzero(patches.mesh.face_vertices[patches.source_corners] == vertices)
-    base[vertices[own[::-1]]] = own[::-1]  # rather a corner of the vertex itself than of a copy welded to it
+    base[vertices[own[::-1]]] = own[::-1]
     wedges = vertices.copy()
     other = np.flatnonzero(_differ(rows, rows[base[vertices]]))
     corners = np.zeros(0, dtype=np.int64)

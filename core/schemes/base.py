@@ -55,6 +55,32 @@ class Controls(Protocol):
 
 
 @record
+class LinearControls:
+    """Control vectors ``linear (3,f,L)`` of a form without side fields."""
+
+    linear: Floats
+
+    def take(self, rows: Ints) -> LinearControls:
+        """Those of some of the faces."""
+        return LinearControls(self.linear[:, rows])
+
+    def fields(self, t: Floats) -> Floats:
+        """No fields: ``(3,f,0,m)``."""
+        return np.zeros((3, self.linear.shape[1], 0, np.shape(t)[-1]))
+
+    def field_derivatives(self, t: Floats) -> tuple[Floats, Floats]:
+        """No fields, no derivatives."""
+        return self.fields(t), self.fields(t)
+
+
+def linear_basis(columns: Floats) -> Basis:
+    """The basis of a form without side fields, from the jets ``(3,L,S)`` of its columns."""
+    linear = np.ascontiguousarray(np.swapaxes(columns, 1, 2))
+    none = np.zeros((*linear.shape[:2], 0))
+    return Basis(linear, none, none, none[..., None].repeat(2, axis=-1))
+
+
+@record
 class Form:
     """A vector function on the faces of one class.
 
@@ -121,11 +147,14 @@ class Scheme(Protocol):
     summary: str
     source: str
     faces: str
+    keeps: str
     continuity: str
     normals: tuple[str, ...]
 
-    def prepare(self, mesh: PolygonMesh, options: Any) -> Patches:
-        """Control data of the whole mesh; raises CurvifyError where the mesh cannot be used."""
+    def prepare(self, mesh: PolygonMesh, options: Any) -> Any:
+        """Patches of the whole mesh, or what a driver of the scheme's own takes; raises CurvifyError where the mesh
+        cannot be used.
+        """
 
 
 def bernstein(coefficients: Floats, t: Floats) -> Floats:
@@ -149,6 +178,25 @@ def _combine(coefficients: Floats, basis: Floats) -> Floats:
     for i in range(1, len(basis)):
         total += coefficients[..., i, None] * basis[i]
     return total
+
+
+def bernstein_product(a: Floats, b: Floats, times: Callable[[Floats, Floats], Floats] = np.multiply) -> Floats:
+    """Bezier points ``(...,p+q+1,c)`` of the product of polynomials ``a (...,p+1,c)`` and ``b (...,q+1,c)``.
+
+    ``times`` multiplies coefficients; any bilinear product over the last axis will do.
+    """
+    p, q = a.shape[-2] - 1, b.shape[-2] - 1
+    rows: list[Any] = [0.0] * (p + q + 1)
+    for i in range(p + 1):
+        for j in range(q + 1):
+            rows[i + j] = rows[i + j] + comb(p, i) * comb(q, j) / comb(p + q, i + j) * times(a[..., i, :], b[..., j, :])
+    return np.stack(rows, axis=-2)
+
+
+def elevated(points: Floats, degree: int) -> Floats:
+    """The Bezier points ``(...,q+1,c)`` of the same polynomials at a higher ``degree``."""
+    raise_by = degree + 1 - points.shape[-2]
+    return bernstein_product(points, np.ones((raise_by + 1, 1))) if raise_by else points
 
 
 def bernstein_basis(degree: int, t: Floats) -> Floats:

@@ -33,6 +33,7 @@ name = "gregory"
 summary = "n-sided Gregory patches: interpolates vertices and normals, smooth everywhere"
 source = "Leung, Wang, Zhang: Localized Construction of Curved Surfaces from Polygon Meshes"
 faces = "any polygons; concave ones and those over 64 sides are split"
+keeps = "vertices, given normals, creases, rims"
 continuity = "G1"
 normals = NORMALS
 

@@ -7,13 +7,14 @@ where the patch would fold (Leung, Wang, Zhang, section 2.3; the fold tests are 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from curvify.arrays import as_slice, cross, gather, leading, take_rows, unit_rows, values_of
 from curvify.convex import Split, split_at_corners, split_polygons
-from curvify.edges import bending_normals, edge_curves, normal_fields, smooth_tangents
+from curvify.edges import Directions, bending_normals, edge_curves, normal_fields, smooth_tangents
 from curvify.mesh import Bools, Floats, Ints
 from curvify.pieces import MAX_SIDES, split_notes
 from curvify.polygons import newell_normals
@@ -56,9 +57,8 @@ class Patchwork:
     """Pieces of faces with their curves and normals.
 
     ``topology`` of the pieces; ``split`` where they come from, in terms of the cleaned loops; per edge
-    ``curves (3,E,4)``; ``fields (3,N,4)`` edge normals and ``side_field (C,)`` the one of each half-edge; ``normals
-    (C,3)`` of the corners. ``steps`` are those ``(3,C)`` from each corner to the next Bezier points ahead and
-    back, ``sines (C,)`` those of the angles between them.
+    ``curves (3,E,d+1)``; ``fields (3,N,q+1)`` edge normals and ``side_field (C,)`` the one of each half-edge; ``normals
+    (C,3)`` of the corners. In memory the points of an edge lie together.
     """
 
     coarse: Coarse
@@ -69,10 +69,26 @@ class Patchwork:
     fields: Floats
     side_field: Ints
     normals: Floats
-    steps: tuple[Floats, Floats]
-    sines: Floats
     warnings: list[str] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
+
+    @classmethod
+    def on(
+        cls, coarse: Coarse, features: Features, split: Split, frame: Frame, curves: Floats, fields: Floats
+    ) -> Patchwork:
+        """The pieces of a frame with ``curves (E,d+1,3)`` and ``fields (N,q+1,3)``."""
+        curves, fields = curves.transpose(2, 0, 1), fields.transpose(2, 0, 1)
+        return cls(coarse, features, split, frame.topology, curves, fields, frame.side_field, frame.normals)
+
+    @cached_property
+    def steps(self) -> tuple[Floats, Floats]:
+        """Steps ``(3,C)`` from each corner to the next points of its two cubic curves, ahead and back."""
+        return _corner_tangents(self.topology, self.coarse.positions, self.curves.transpose(1, 2, 0))
+
+    @cached_property
+    def sines(self) -> Floats:
+        """Sine ``(C,)`` of the angle between the two steps at each corner, negative where the patch folds there."""
+        return _corner_sines(*self.steps, self.normals)
 
     def corner_points(self, corners: Ints) -> Floats:
         """Positions ``(3,f,n)`` of corners ``(f,n)``."""
@@ -83,20 +99,21 @@ class Patchwork:
         return leading(take_rows(self.normals, corners))
 
     def side_curves(self, corners: Ints) -> Floats:
-        """Bezier points ``(3,f,n,4)`` of the half-edges ``(f,n)``, each in its own direction."""
-        return self._in_direction(self.curves, self.topology.edge[corners], corners)
+        """Bezier points ``(3,f,n,d+1)`` of the half-edges ``(f,n)``, each in its own direction."""
+        return self.in_direction(self.curves, self.topology.edge[corners], corners)
 
     def side_fields(self, corners: Ints) -> Floats:
-        """Bezier points ``(3,f,n,4)`` of the normal fields of the half-edges ``(f,n)``."""
-        return self._in_direction(self.fields, self.side_field[corners], corners)
+        """Bezier points ``(3,f,n,q+1)`` of the normal fields of the half-edges ``(f,n)``."""
+        return self.in_direction(self.fields, self.side_field[corners], corners)
 
-    def _in_direction(self, points: Floats, rows: Ints, corners: Ints) -> Floats:
-        """The Bezier points ``(3,f,n,4)`` of some rows of ``points (3,N,4)``, turned where half-edges run backward.
+    def in_direction(self, points: Floats, rows: Ints, corners: Ints) -> Floats:
+        """The Bezier points ``(3,f,n,d)`` of some rows of ``points (3,N,d)``, turned where half-edges run backward.
 
         In memory the faces come last.
         """
-        stored = points.transpose(1, 2, 0).reshape(-1, 12)
-        found = leading(take_rows(stored, rows)).reshape(4, 3, *rows.shape)
+        size = points.shape[2]
+        stored = points.transpose(1, 2, 0).reshape(-1, 3 * size)
+        found = leading(take_rows(stored, rows)).reshape(size, 3, *rows.shape)
         forward = np.asfortranarray(self.topology.forward[corners])
         return np.where(forward, found, found[::-1]).transpose(1, 2, 3, 0)
 
@@ -169,10 +186,46 @@ def build_patchwork(coarse: Coarse, lengths: str, split_rule: str, rule: FoldRul
     return work
 
 
-def _build(coarse: Coarse, features: Features, split: Split, lengths: str) -> Patchwork:
-    """Curves and fields of all edges of the pieces."""
+@record
+class Frame:
+    """Pieces of faces and what their edges must do, before a scheme draws its curves.
+
+    ``topology`` of the pieces; ``normals (C,3)`` of their corners; per edge, in canonical direction, ``start``, ``end
+    (E,3)``, unit end ``tangents (E,2,3)`` and ``bending (E,3)``. Then the edges' sides: ``side_field (C,)`` numbers
+    them for every half-edge; ``half_edges (N,)`` names one half-edge of each and ``pairs (N,2,3)`` its end normals in
+    canonical direction. The first E are those of the edges' first half-edges; half-edges with other normals, on
+    creases, have one of their own.
+    """
+
+    topology: Topology
+    normals: Floats
+    start: Floats
+    end: Floats
+    tangents: Floats
+    bending: Floats
+    side_field: Ints
+    half_edges: Ints
+    pairs: Floats
+
+    @property
+    def side_edges(self) -> Ints:
+        """Edge of each side ``(N,)``."""
+        return self.topology.edge[self.half_edges]
+
+
+def edge_frame(
+    coarse: Coarse,
+    features: Features,
+    split: Split,
+    directions: Directions = smooth_tangents,
+    apart: Bools | None = None,
+) -> Frame:
+    """The frame of the pieces: the features' tangents on the mesh's edges, ``directions`` on diagonals.
+
+    The half-edges of edges ``apart (E,)`` of the mesh have a side each, also where their normals agree.
+    """
     positions, base = coarse.positions, coarse.topology
-    topology = _piece_topology(coarse, split)
+    topology = piece_topology(coarse, split)
     normals = take_rows(features.normals, split.source_corners)
     count = len(base.edges)
     first, _ = sides_of_edges(topology)
@@ -184,43 +237,47 @@ def _build(coarse: Coarse, features: Features, split: Split, lengths: str) -> Pa
         chord = (end - start)[count:]
         area = newell_normals(positions, split.face_offsets, split.face_vertices)[topology.faces[first[count:]]]
         extra = bending_normals(chord, a, b, area)
-        across = np.stack([smooth_tangents(chord, n, extra) for n in (a, b)], axis=1)
+        across = np.stack([directions(chord, n, extra) for n in (a, b)], axis=1)
         tangents, bending = np.concatenate([tangents, across]), np.concatenate([bending, extra])
-    curves = edge_curves(start, end, tangents[:, 0], tangents[:, 1], lengths)
-    side_field, edge, pair = _sides(topology, normals, ends)
-    fields = normal_fields(curves[as_slice(edge)], pair[:, 0], pair[:, 1], bending[as_slice(edge)])
-    steps = _corner_tangents(topology, positions, curves)
-    sines = _corner_sines(*steps, normals)
-    curves, fields = curves.transpose(2, 0, 1), fields.transpose(2, 0, 1)
-    return Patchwork(coarse, features, split, topology, curves, fields, side_field, normals, steps, sines)
+    each = np.zeros(len(topology.edges), dtype=bool)
+    if apart is not None:
+        each[:count] = apart
+    side_field, half_edges, pairs = _sides(topology, normals, first, ends, each)
+    return Frame(topology, normals, start, end, tangents, bending, side_field, half_edges, pairs)
 
 
-def _sides(topology: Topology, normals: Floats, ends: Floats) -> tuple[Ints, Ints, Floats]:
-    """Normal fields that the edges need: the one of each half-edge ``(C,)``, the edge and end normals of each field.
+def _build(coarse: Coarse, features: Features, split: Split, lengths: str) -> Patchwork:
+    """Curves and fields of all edges of the pieces."""
+    frame = edge_frame(coarse, features, split)
+    curves = edge_curves(frame.start, frame.end, frame.tangents[:, 0], frame.tangents[:, 1], lengths)
+    edge = as_slice(frame.side_edges)
+    fields = normal_fields(curves[edge], frame.pairs[:, 0], frame.pairs[:, 1], frame.bending[edge])
+    return Patchwork.on(coarse, features, split, frame, curves, fields)
 
-    The first E are those of the edges' first half-edges, ``ends (E,2,3)``; half-edges with other normals, on
-    creases, have one of their own.
+
+def _sides(topology: Topology, normals: Floats, first: Ints, ends: Floats, each: Bools) -> tuple[Ints, Ints, Floats]:
+    """Sides of edges as in `Frame`: those of the ``first (E,)`` half-edges have the end normals ``ends (E,2,3)``; edges
+    of which ``each`` half-edge needs a side of its own.
     """
     side_field = topology.edge.copy()
-    edges = np.arange(len(ends))
-    first = np.zeros((topology.vertex_count, 3))
-    first[topology.vertices] = normals
-    several = (normals != first[topology.vertices]).any(axis=1)
-    if not several.any():
-        return side_field, edges, ends
+    some = np.zeros((topology.vertex_count, 3))
+    some[topology.vertices] = normals
+    several = (normals != some[topology.vertices]).any(axis=1)
+    if not several.any() and not each.any():
+        return side_field, first, ends
     split = np.zeros(topology.vertex_count, dtype=bool)
     split[topology.vertices[several]] = True
-    near = np.flatnonzero(split[topology.vertices] | split[topology.vertices[topology.next]])
-    own = end_normals(topology, normals, near)
-    differs = (own != ends[topology.edge[near]]).any(axis=(1, 2))
+    near = np.flatnonzero(split[topology.vertices] | split[topology.vertices[topology.next]] | each[topology.edge])
+    own, edge = end_normals(topology, normals, near), topology.edge[near]
+    differs = (own != ends[edge]).any(axis=(1, 2)) | (each[edge] & (near != first[edge]))
     own, near = own[differs], near[differs]
     order = np.argsort(topology.edge[near], kind="stable")
     own, near = own[order], near[order]
     side_field[near] = len(ends) + np.arange(len(near))
-    return side_field, np.concatenate([edges, topology.edge[near]]), np.concatenate([ends, own])
+    return side_field, np.concatenate([first, near]), np.concatenate([ends, own])
 
 
-def _piece_topology(coarse: Coarse, split: Split) -> Topology:
+def piece_topology(coarse: Coarse, split: Split) -> Topology:
     """Topology of the pieces: the mesh's edges keep their numbers, diagonals follow."""
     base = coarse.topology
     if len(split.face_vertices) == len(base.vertices) and not len(split.diagonal_faces):
