@@ -373,3 +373,21 @@ def grid_errors(dense: DenseMesh, level: int, error: Callable[[Array], Array]) -
     kites = np.repeat(np.arange(len(blocks)), blocks.shape[1])
     pairs = np.unique(np.stack([kites, blocks.ravel()], axis=1), axis=0)
     return error(dense.positions[pairs[:, 1]])
+
+
+def geodesic(times: int) -> PolygonMesh:
+    """An icosahedron whose triangles were cut in 4 some times, every time back on the unit sphere."""
+    mesh = icosahedron()
+    for _ in range(times):
+        flat = curvify.refine(mesh, "phong", 1, alpha=0.0)
+        mesh = PolygonMesh.from_faces(unit(flat.positions), flat.faces.tolist())
+    return mesh
+
+
+def dihedral_angles(dense: DenseMesh) -> Array:
+    """Angles in degrees between the triangles at every edge of a closed dense mesh."""
+    corners = dense.positions[dense.faces]
+    facing = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    ends = np.sort(np.stack([dense.faces, np.roll(dense.faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    pairs = np.lexsort(ends.T).reshape(-1, 2) // 3
+    return degrees(facing[pairs[:, 0]], facing[pairs[:, 1]])

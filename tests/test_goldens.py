@@ -6,11 +6,13 @@ Write them anew with ``pytest tests/test_goldens.py --update-goldens`` after a c
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import curvify
+from curvify.refinement import refinable
 
 TESTS = Path(__file__).resolve().parent
 SAMPLES = TESTS.parent / "sample_meshes"
@@ -25,6 +27,12 @@ CASES = [
     ("l_part", {}, "l_part"),
     ("vase", {}, "vase"),
     ("cylinder", {}, "cylinder"),
+    ("dodecahedron", {"scheme": "png1", "normals": "smooth"}, "dodecahedron-png1-smooth"),
+    ("l_part", {"scheme": "png1", "kappa": -0.1, "sharp_angle": 60.0}, "l_part-png1"),
+    ("dodecahedron", {"scheme": "pn"}, "dodecahedron-pn"),
+    ("vase", {"scheme": "phong"}, "vase-phong"),
+    ("l_part", {"scheme": "overveld"}, "l_part-overveld"),
+    ("vase", {"scheme": "overveld", "rim": True, "midpoint_normal": "geometry"}, "vase-overveld"),
 ]
 
 
@@ -37,9 +45,9 @@ def ulps(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize(("sample", "options", "name"), CASES, ids=[case[2] for case in CASES])
 def test_a_sample_gives_the_stored_dense_mesh(
-    sample: str, options: dict[str, str], name: str, request: pytest.FixtureRequest, tmp_path: Path
+    sample: str, options: dict[str, Any], name: str, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
-    surface = curvify.surface(curvify.read(SAMPLES / f"{sample}.obj"), **options)
+    surface = refinable(curvify.read(SAMPLES / f"{sample}.obj"), **options)
     path = TESTS / "golden" / f"{name}.ply"
     if request.config.getoption("--update-goldens"):
         surface.write(path, LEVEL)

@@ -100,13 +100,13 @@ def failing(error):
 
 
 def test_out_of_memory(call, monkeypatch):
-    monkeypatch.setattr("curvify.cli.run.surface", failing(MemoryError()))
+    monkeypatch.setattr("curvify.cli.run.refinable", failing(MemoryError()))
     result = call("refine", "cube.obj", "dense.ply")
     assert (result.code, result.err) == (2, "curvify: error: out of memory; choose a lower level\n")
 
 
 def test_the_unexpected_is_one_line_unless_a_traceback_is_wanted(call, monkeypatch):
-    monkeypatch.setattr("curvify.cli.run.surface", failing(RuntimeError("two\nlines")))
+    monkeypatch.setattr("curvify.cli.run.refinable", failing(RuntimeError("two\nlines")))
     result = call("refine", "cube.obj", "dense.ply")
     assert result.code == 2
     assert result.err.startswith("curvify: internal error: RuntimeError: two lines; ")

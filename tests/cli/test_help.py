@@ -64,12 +64,18 @@ def test_choices_of_options_are_those_of_the_library():
     from curvify.refinement import MAX_FACES
     from curvify.schemes import NAMES
     from curvify.schemes.gregory import CROSS_TANGENTS, NORMALS
+    from curvify.schemes.overveld_edges import EDGE_RULES, MIDPOINT_NORMALS
+    from curvify.schemes.png1 import CREASE_UNITS
+    from curvify.schemes.png1 import NORMALS as PNG1_NORMALS
 
     parameters = {parameter.name: parameter for parameter in FOUND["refine"].params}
     choices = {name: tuple(p.type.choices) for name, p in parameters.items() if isinstance(p.type, click.Choice)}
     assert choices["scheme"] == NAMES
     assert choices["cross_tangent"] == CROSS_TANGENTS
-    assert choices["normals"] == NORMALS
+    assert set(choices["normals"]) == set(NORMALS) | set(PNG1_NORMALS)
+    assert choices["crease_units"] == CREASE_UNITS
+    assert choices["edge_rule"] == EDGE_RULES
+    assert choices["midpoint_normal"] == MIDPOINT_NORMALS
     assert choices["sharp_from"] == SHARP_SOURCES
     assert choices["weld"] == WELD_MODES
     assert choices["split_rule"] == RULES

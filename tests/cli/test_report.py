@@ -63,7 +63,7 @@ def test_faces_that_come_early_are_measured_in_the_end(folder):
     from curvify.sinks import ArraySink
 
     made = surface(curvify.read("cube.obj"))
-    ordered = Recorder(made.patches)
+    ordered = Recorder(made)
     made.stream(ordered.into(ArraySink()), 3, threads=1)
 
     class Backwards(Recorder):
@@ -92,8 +92,8 @@ def test_a_vertex_that_moves_is_noticed(folder):
     from curvify.sinks import ArraySink
 
     made = surface(curvify.read("cube.obj"))
-    recorder = Recorder(made.patches)
-    recorder.patches.positions[3] = 5.0  # the curves still end where it was
+    recorder = Recorder(made)
+    recorder.coarse.positions[3] = 5.0  # the curves still end where it was
     made.stream(recorder.into(ArraySink()), 1)
     assert recorder.deviation == 0
     recorder._expected = recorder._expected + np.array([0, 0, 0.25])

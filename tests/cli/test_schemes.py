@@ -20,6 +20,6 @@ def test_every_scheme_is_listed_for_programs(call):
     schemes = json.loads(call("schemes", "--json").out)
     assert [scheme["name"] for scheme in schemes] == list(NAMES)
     for scheme in schemes:
-        assert set(scheme) == {"name", "summary", "faces", "continuity", "normals", "options", "source"}
+        assert set(scheme) == {"name", "summary", "faces", "keeps", "continuity", "normals", "options", "source"}
     assert schemes[0]["options"]["alpha"] == 1.0
     assert schemes[0]["normals"][0] == "exact"

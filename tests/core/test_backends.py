@@ -34,9 +34,9 @@ def test_auto_does_without_a_device_but_gpu_does_not(monkeypatch):
         pass
 
 
-@pytest.mark.parametrize("scheme", NAMES)
+@pytest.mark.parametrize("scheme", [name for name in NAMES if name != "overveld"])
 def test_the_weights_of_points_sum_to_one(scheme):
-    """A backend may move the points of a form to another origin."""
+    """A backend may move the points of a form to another origin; overveld has no forms."""
     patches = curvify.surface(mixed_ball(), scheme).patches
     for patch_class in patches.classes:
         form = patch_class.surface
