@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from curvify import dissect
-from curvify.convex import Split, _assemble, split_at_corners, split_polygons
+from curvify.convex import Split, cut_along, split_at_corners, split_polygons
 from curvify.errors import OptionError
 from curvify.mesh import Bools, Floats, Ints
 from curvify.polygons import judge, newell_normals, next_corners, previous_corners
@@ -44,7 +44,7 @@ TWO_HOLES: Keyhole = (
 def whole_faces(face_offsets: np.ndarray, face_vertices: np.ndarray) -> Split:
     """Every face as one piece."""
     reasons = np.zeros(len(face_offsets) - 1, dtype=np.uint8)
-    return _assemble(face_offsets, face_vertices, np.zeros((0, 2), dtype=np.int64), reasons)
+    return cut_along(face_offsets, face_vertices, np.zeros((0, 2), dtype=np.int64), reasons)
 
 
 def corner_crosses(positions: np.ndarray, face_offsets: np.ndarray, face_vertices: np.ndarray) -> np.ndarray:
