@@ -1,0 +1,1 @@
+"""Dense triangle meshes to few convex polygons that refine back to them."""

@@ -1,0 +1,220 @@
+"""From a dense mesh to few polygons: the steps in order, and the search for the number asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from curvify.errors import OptionError
+from curvify.mesh import Bools, Floats, Ints, Marks, PolygonMesh
+from curvify.simplify.borders import Tolerance
+from curvify.simplify.checks import check_polygons
+from curvify.simplify.decompose import Partition, polygonize
+from curvify.simplify.features import find_creases, flat_polygons, sector_normals, sharp_half_edges
+from curvify.simplify.merge import FREE, PRESSED, drop_vertices, merge
+from curvify.simplify.polygons import Polygons
+from curvify.simplify.triangles import Triangles, face_components, prepare_triangles
+from curvify.simplify.vsa import COMPACT_SWEEPS, SWEEPS, Metric, cluster, exchange
+from curvify.words import count_of
+
+#: Regions to begin with, as a share of the polygons wanted: convex pieces outnumber regions.
+FIRST_SHARE = 0.5
+#: Attempts at the number of regions, and the surplus of polygons that merging may take away well.
+ATTEMPTS, SURPLUS = 6, 1.06
+#: How far borders may leave their chords, as shares of the diagonal: on creases and boundaries, and elsewhere.
+SHARP_TOLERANCE, SMOOTH_TOLERANCE = 0.003, 0.01
+#: The count asked for is met within this share.
+CLOSE = 0.05
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Options:
+    """What simplifying does.
+
+    ``faces`` polygons wanted, or ``proxies`` regions with as many polygons as they take; ``compactness`` the weight of
+    short regions against flat ones, 0 for pure variational shape approximation; ``sharp_angle`` in degrees from which
+    edges of the dense mesh are sharp; ``split_rule`` and ``weld`` as for refining.
+    """
+
+    faces: int | None = None
+    proxies: int | None = None
+    compactness: float = 4.0
+    sharp_angle: float = 30.0
+    split_rule: str = "best"
+    weld: str = "auto"
+
+    def __post_init__(self) -> None:
+        if (self.faces is None) == (self.proxies is None):
+            raise OptionError("give either the number of faces or the number of proxies")
+        if min(self.faces or 1, self.proxies or 1) < 1:
+            raise OptionError("at least 1 face must be asked for")
+        if not self.compactness >= 0:
+            raise OptionError(f"the compactness must be 0 or more, not {self.compactness}")
+        if not 0 < self.sharp_angle <= 180:
+            raise OptionError(f"the sharp angle must be between 0 and 180 degrees, not {self.sharp_angle}")
+
+
+@dataclass(eq=False)
+class Simplified:
+    """A coarse mesh and what it was made from.
+
+    ``mesh`` with corner normals and marks; ``dense`` the triangles; ``polygons`` in vertices of these; ``labels
+    (F,)`` the region of each triangle; ``creases (C,)``; ``counts``; ``warnings``.
+    """
+
+    mesh: PolygonMesh
+    dense: Triangles
+    polygons: Polygons
+    labels: Ints
+    creases: Bools
+    counts: dict[str, int] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+
+
+@dataclass(eq=False)
+class _Attempt:
+    """Polygons from so many regions."""
+
+    polygons: Polygons
+    creases: Bools
+    labels: Ints
+
+
+def simplify(mesh: PolygonMesh, options: Options, progress: Progress | None = None) -> Simplified:
+    """Few convex polygons for a dense mesh. Raises MeshError where there is nothing to simplify."""
+    dense, notes = prepare_triangles(mesh, options.weld)
+    metric = Metric.of(dense)
+    if options.faces is not None and options.faces >= dense.face_count:
+        notes.append(f"the mesh has only {count_of(dense.face_count, 'triangle')}; they are kept as they are")
+        attempt = _attempt(dense, metric, np.arange(dense.face_count), options)
+    else:
+        attempt = _search(dense, metric, options, notes, progress)
+    polygons, creases = attempt.polygons, attempt.creases
+    check_polygons(dense, polygons)
+    result = _coarse_mesh(mesh, dense, attempt)
+    result.warnings = [*mesh.warnings, *notes]
+    result.counts = {
+        "input_faces": mesh.face_count,
+        "triangles": dense.face_count,
+        "regions": int(attempt.labels.max()) + 1,
+        "faces": polygons.count,
+        "vertices": result.mesh.vertex_count,
+        "crease_edges": len(result.mesh.marks.crease_edges),
+        "flat_faces": len(result.mesh.marks.flat_faces),
+    }
+    return result
+
+
+def _search(
+    dense: Triangles, metric: Metric, options: Options, notes: list[str], progress: Progress | None
+) -> _Attempt:
+    """Find the number of regions that gives the polygons wanted, and merge those that are too many."""
+    start = face_components(dense)
+    if options.proxies is not None:
+        labels = cluster(dense, metric, options.proxies, start)
+        return _attempt(dense, metric, exchange(dense, metric, labels, SWEEPS), options)
+    wanted = options.faces or 1
+    count = max(int(wanted * FIRST_SHARE), 1)
+    labels = start
+    low, high = 0, 0
+    best: _Attempt | None = None
+    for _ in range(ATTEMPTS):
+        before = int(labels.max()) + 1
+        if count < before:
+            labels = start
+        labels = cluster(dense, metric, count, labels)
+        attempt = _attempt(dense, metric, labels, options)
+        found = attempt.polygons.count
+        if best is None or _distance(found, wanted) < _distance(best.polygons.count, wanted):
+            best = attempt
+        if wanted <= found <= SURPLUS * wanted or found < wanted and int(labels.max()) + 1 < count:
+            break
+        if found < wanted:
+            low = max(low, count)
+            count = max(int(np.ceil(count * wanted / found * 1.02)), count + 1)
+            count = min(count, (low + high + 1) // 2) if high else count
+        else:
+            high = min(high, count) if high else count
+            count = max(int(count * wanted / found), count // 3, (low + high) // 2 if low else 1, 1)
+        if high and count >= high or count <= low or count < int(start.max()) + 1:
+            break
+    assert best is not None
+    return _reduce(dense, best, wanted, notes)
+
+
+def _distance(found: int, wanted: int) -> float:
+    """How far a number is from that wanted; too many are better than too few, since they can be merged."""
+    return (found - wanted) / wanted if found >= wanted else 3 * (wanted - found) / wanted
+
+
+def _attempt(dense: Triangles, metric: Metric, labels: Ints, options: Options) -> _Attempt:
+    """Polygons from regions: compacted, made discs, cut, mended, merged where that costs nothing."""
+    if options.compactness > 0 and int(labels.max()) + 1 < dense.face_count:
+        labels = exchange(dense, metric.compact(labels, options.compactness), labels, COMPACT_SWEEPS)
+    tolerance = Tolerance(SHARP_TOLERANCE * dense.diagonal, SMOOTH_TOLERANCE * dense.diagonal)
+    sharp = sharp_half_edges(dense, options.sharp_angle)
+    partition = Partition(dense, metric, sharp, tolerance, options.split_rule, labels)
+    polygons = polygonize(partition)
+    creases = find_creases(dense, metric, partition.labels, polygons)
+    polygons, creases = merge(dense.positions, polygons, creases, FREE, 1)
+    polygons, creases = drop_vertices(dense.positions, polygons, creases, tolerance.sharp)
+    return _Attempt(polygons, creases, partition.labels)
+
+
+def _reduce(dense: Triangles, attempt: _Attempt, wanted: int, notes: list[str]) -> _Attempt:
+    """Merge down to the number wanted."""
+    polygons, creases = attempt.polygons, attempt.creases
+    for limits in PRESSED:
+        polygons, creases = merge(dense.positions, polygons, creases, limits, wanted)
+    polygons, creases = drop_vertices(dense.positions, polygons, creases, SHARP_TOLERANCE * dense.diagonal)
+    if polygons.count > (1 + CLOSE) * wanted:
+        notes.append(
+            f"{count_of(wanted, 'face')} cannot hold this mesh's topology and creases; "
+            f"{polygons.count:,} are the fewest found"
+        )
+    elif polygons.count < (1 - CLOSE) * wanted:
+        notes.append(f"{count_of(polygons.count, 'face')} hold everything; more would add nothing")
+    return _Attempt(polygons, creases, attempt.labels)
+
+
+def _coarse_mesh(mesh: PolygonMesh, dense: Triangles, attempt: _Attempt) -> Simplified:
+    """The polygons as a mesh of their own, with normals and marks."""
+    polygons, creases = attempt.polygons, attempt.creases
+    normals = sector_normals(dense, attempt.labels, polygons, creases)
+    used = np.zeros(len(dense.positions), dtype=bool)
+    used[polygons.vertices] = True
+    number = np.cumsum(used) - 1
+    result = PolygonMesh(
+        positions=dense.positions[used],
+        face_offsets=polygons.offsets,
+        face_vertices=number[polygons.vertices],
+        corner_normals=normals,
+        marks=_marks(dense, attempt, number),
+        position_dtype=mesh.position_dtype,
+    )
+    return Simplified(result, dense, polygons, attempt.labels, creases)
+
+
+def _marks(dense: Triangles, attempt: _Attempt, number: Ints) -> Marks:
+    """Crease edges, and flat faces that only creases or their like in one plane surround."""
+    polygons, creases = attempt.polygons, attempt.creases
+    topology = polygons.topology(dense.positions)
+    once = np.flatnonzero(creases & (topology.twin > np.arange(len(creases))))
+    edges = number[np.stack([polygons.vertices[once], polygons.vertices[topology.next[once]]], axis=1)]
+    flat = flat_polygons(dense, attempt.labels, polygons)
+    return Marks(
+        crease_edges=edges,
+        crease_sharpness=np.ones((len(edges), 2)),
+        flat_faces=np.flatnonzero(flat & _set_apart(topology.faces, topology.twin, creases, flat)),
+    )
+
+
+def _set_apart(faces: Ints, twin: Ints, creases: Bools, flat: Bools) -> Bools:
+    """Faces ``(P,)`` each side of which is a crease, a boundary or shared with a flat face."""
+    beside = (twin >= 0) & flat[faces[np.maximum(twin, 0)]]
+    open_ = np.bincount(faces, ~(creases | beside), len(flat))
+    return open_ == 0
