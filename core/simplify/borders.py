@@ -16,7 +16,7 @@ from curvify.simplify.regions import border_half_edges
 from curvify.simplify.triangles import Triangles
 
 #: A chord is split where its border leaves it by more than this share of its length, weighted by the bend there.
-SHARE = 0.25
+SHARE = 0.35
 #: The least weight of the bend between two regions.
 LEAST_BEND = 0.35
 
@@ -118,10 +118,13 @@ def chords_of(borders: Borders, anchors: Bools) -> Chords:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far a border may leave its chord, as lengths: ``sharp`` on creases and boundaries, ``smooth`` elsewhere."""
+    """How far a border may leave its chord, as lengths: ``sharp`` on creases and boundaries, ``smooth`` elsewhere; and
+    ``share`` of the chord's length, see `SHARE`.
+    """
 
     sharp: float
     smooth: float
+    share: float = SHARE
 
 
 def find_anchors(mesh: Triangles, borders: Borders, forced: Bools, tolerance: Tolerance) -> Bools:
@@ -203,7 +206,7 @@ def _leaves_its_border(
     allowed = np.where(sharp, tolerance.sharp, tolerance.smooth)
     # A gap that is rounding asks for nothing, however short the chord.
     rounding = 1e-9 * mesh.diagonal
-    strays = (gap > rounding) & ((gap * bend > SHARE * length) | (gap > allowed))
+    strays = (gap > rounding) & ((gap * bend > tolerance.share * length) | (gap > allowed))
     return (gap >= 0) & (strays | closed)
 
 

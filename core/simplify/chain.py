@@ -9,7 +9,7 @@ import numpy as np
 
 from curvify.errors import OptionError
 from curvify.mesh import Bools, Floats, Ints, Marks, PolygonMesh
-from curvify.simplify.borders import Tolerance
+from curvify.simplify.borders import SHARE, Tolerance
 from curvify.simplify.checks import check_polygons
 from curvify.simplify.decompose import Partition, polygonize
 from curvify.simplify.features import find_creases, flat_polygons, sector_normals, sharp_half_edges
@@ -22,9 +22,13 @@ from curvify.words import count_of
 #: Regions to begin with, as a share of the polygons wanted: convex pieces outnumber regions.
 FIRST_SHARE = 0.5
 #: Attempts at the number of regions, and the surplus of polygons that merging may take away well.
-ATTEMPTS, SURPLUS = 6, 1.06
-#: How far borders may leave their chords, as shares of the diagonal: on creases and boundaries, and elsewhere.
-SHARP_TOLERANCE, SMOOTH_TOLERANCE = 0.003, 0.01
+ATTEMPTS, SURPLUS = 8, 1.06
+#: Polygons a region from which on chords are allowed more, by what factor and how often.
+PIECES, LOOSER, LOOSEST = 1.75, 1.5, 6
+#: How far borders may leave their chords, as shares of the size of a polygon: on creases and boundaries, and elsewhere.
+SHARP_TOLERANCE, SMOOTH_TOLERANCE = 0.12, 0.4
+#: How far dropping a vertex of a crease or a boundary may move that, as a share of the same.
+DROP_TOLERANCE = 0.012
 #: The count asked for is met within this share.
 CLOSE = 0.05
 
@@ -77,11 +81,12 @@ class Simplified:
 
 @dataclass(eq=False)
 class _Attempt:
-    """Polygons from so many regions."""
+    """Polygons from so many regions; ``drop`` how far dropping vertices may move creases."""
 
     polygons: Polygons
     creases: Bools
     labels: Ints
+    drop: float
 
 
 def simplify(mesh: PolygonMesh, options: Options, progress: Progress | None = None) -> Simplified:
@@ -90,7 +95,7 @@ def simplify(mesh: PolygonMesh, options: Options, progress: Progress | None = No
     metric = Metric.of(dense)
     if options.faces is not None and options.faces >= dense.face_count:
         notes.append(f"the mesh has only {count_of(dense.face_count, 'triangle')}; they are kept as they are")
-        attempt = _attempt(dense, metric, np.arange(dense.face_count), options)
+        attempt = _attempt(dense, metric, np.arange(dense.face_count), options, dense.face_count)
     else:
         attempt = _search(dense, metric, options, notes, progress)
     polygons, creases = attempt.polygons, attempt.creases
@@ -116,31 +121,32 @@ def _search(
     start = face_components(dense)
     if options.proxies is not None:
         labels = cluster(dense, metric, options.proxies, start)
-        return _attempt(dense, metric, exchange(dense, metric, labels, SWEEPS), options)
+        return _attempt(dense, metric, exchange(dense, metric, labels, SWEEPS), options, options.proxies)
     wanted = options.faces or 1
-    count = max(int(wanted * FIRST_SHARE), 1)
-    labels = start
-    low, high = 0, 0
+    labels, count, least = start, max(int(wanted * FIRST_SHARE), 1), int(start.max()) + 1
+    loose, low, high = 1.0, 0, dense.face_count
     best: _Attempt | None = None
     for _ in range(ATTEMPTS):
-        before = int(labels.max()) + 1
-        if count < before:
-            labels = start
-        labels = cluster(dense, metric, count, labels)
-        attempt = _attempt(dense, metric, labels, options)
-        found = attempt.polygons.count
+        labels = cluster(dense, metric, count, labels if count > int(labels.max()) else start)
+        attempt = _attempt(dense, metric, labels, options, wanted, loose)
+        found, made = attempt.polygons.count, int(labels.max()) + 1
         if best is None or _distance(found, wanted) < _distance(best.polygons.count, wanted):
             best = attempt
-        if wanted <= found <= SURPLUS * wanted or found < wanted and int(labels.max()) + 1 < count:
+        if wanted <= found <= SURPLUS * wanted:
             break
         if found < wanted:
-            low = max(low, count)
-            count = max(int(np.ceil(count * wanted / found * 1.02)), count + 1)
-            count = min(count, (low + high + 1) // 2) if high else count
+            low = count
+            count = min(int(np.ceil(count * wanted / found * 1.02)), (count + high + 1) // 2)
+            if made < low:
+                break
+        elif found > PIECES * (int(attempt.labels.max()) + 1) and loose < LOOSER**LOOSEST:
+            loose *= LOOSER
+            high = dense.face_count
+            continue
         else:
-            high = min(high, count) if high else count
-            count = max(int(count * wanted / found), count // 3, (low + high) // 2 if low else 1, 1)
-        if high and count >= high or count <= low or count < int(start.max()) + 1:
+            high = count
+            count = max(int(count * wanted / found), count // 3, (low + count) // 2 if low else 1)
+        if not low < count < high or count < least:
             break
     assert best is not None
     return _reduce(dense, best, wanted, notes)
@@ -151,18 +157,24 @@ def _distance(found: int, wanted: int) -> float:
     return (found - wanted) / wanted if found >= wanted else 3 * (wanted - found) / wanted
 
 
-def _attempt(dense: Triangles, metric: Metric, labels: Ints, options: Options) -> _Attempt:
-    """Polygons from regions: compacted, made discs, cut, mended, merged where that costs nothing."""
+def _attempt(
+    dense: Triangles, metric: Metric, labels: Ints, options: Options, wanted: int, loose: float = 1.0
+) -> _Attempt:
+    """Polygons from regions: compacted, made discs, cut, mended, merged where that costs nothing.
+
+    ``wanted`` polygons set the tolerance for borders, ``loose`` is a factor on that.
+    """
     if options.compactness > 0 and int(labels.max()) + 1 < dense.face_count:
         labels = exchange(dense, metric.compact(labels, options.compactness), labels, COMPACT_SWEEPS)
-    tolerance = Tolerance(SHARP_TOLERANCE * dense.diagonal, SMOOTH_TOLERANCE * dense.diagonal)
+    size = float(np.sqrt(dense.areas.sum() / wanted))
+    tolerance = Tolerance(loose * SHARP_TOLERANCE * size, loose * SMOOTH_TOLERANCE * size, min(SHARE * loose, 0.7))
     sharp = sharp_half_edges(dense, options.sharp_angle)
     partition = Partition(dense, metric, sharp, tolerance, options.split_rule, labels)
     polygons = polygonize(partition)
     creases = find_creases(dense, metric, partition.labels, polygons)
     polygons, creases = merge(dense.positions, polygons, creases, FREE, 1)
-    polygons, creases = drop_vertices(dense.positions, polygons, creases, tolerance.sharp)
-    return _Attempt(polygons, creases, partition.labels)
+    polygons, creases = drop_vertices(dense.positions, polygons, creases, loose * DROP_TOLERANCE * size)
+    return _Attempt(polygons, creases, partition.labels, loose * DROP_TOLERANCE * size)
 
 
 def _reduce(dense: Triangles, attempt: _Attempt, wanted: int, notes: list[str]) -> _Attempt:
@@ -170,7 +182,7 @@ def _reduce(dense: Triangles, attempt: _Attempt, wanted: int, notes: list[str]) 
     polygons, creases = attempt.polygons, attempt.creases
     for limits in PRESSED:
         polygons, creases = merge(dense.positions, polygons, creases, limits, wanted)
-    polygons, creases = drop_vertices(dense.positions, polygons, creases, SHARP_TOLERANCE * dense.diagonal)
+    polygons, creases = drop_vertices(dense.positions, polygons, creases, attempt.drop)
     if polygons.count > (1 + CLOSE) * wanted:
         notes.append(
             f"{count_of(wanted, 'face')} cannot hold this mesh's topology and creases; "
@@ -178,7 +190,7 @@ def _reduce(dense: Triangles, attempt: _Attempt, wanted: int, notes: list[str]) 
         )
     elif polygons.count < (1 - CLOSE) * wanted:
         notes.append(f"{count_of(polygons.count, 'face')} hold everything; more would add nothing")
-    return _Attempt(polygons, creases, attempt.labels)
+    return _Attempt(polygons, creases, attempt.labels, attempt.drop)
 
 
 def _coarse_mesh(mesh: PolygonMesh, dense: Triangles, attempt: _Attempt) -> Simplified:

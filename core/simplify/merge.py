@@ -28,8 +28,8 @@ class Limits:
 
 
 #: Merging that costs nothing, and what may be tried where there are still too many polygons.
-FREE = Limits(0.04, 0.95)
-PRESSED = (Limits(0.08, 0.9), Limits(0.12, 0.8), Limits(0.2, 0.6))
+FREE = Limits(0.02, 0.99)
+PRESSED = (Limits(0.04, 0.95), Limits(0.08, 0.9), Limits(0.12, 0.8), Limits(0.2, 0.6))
 
 
 def merge(positions: Floats, polygons: Polygons, creases: Bools, limits: Limits, target: int) -> tuple[Polygons, Bools]:

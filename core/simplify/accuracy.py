@@ -1,0 +1,67 @@
+"""How far a coarse mesh and its refinement are from the dense mesh: root mean square and maximum, both ways."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from curvify.mesh import Floats, Ints, PolygonMesh
+from curvify.nearest import NearestPoints, surface_samples
+from curvify.polygons import sum_over_faces
+from curvify.simplify.triangles import Triangles
+
+#: Samples on each of the two surfaces, and the level at which patches are measured.
+SAMPLES, LEVEL = 30_000, 4
+
+
+@dataclass(frozen=True)
+class Distances:
+    """Distances between two surfaces as shares of the bounding box's diagonal: ``rms`` the root of the mean of both
+    directions' mean squares, ``max`` the larger maximum.
+    """
+
+    rms: float
+    max: float
+
+
+def two_way_distances(
+    one: tuple[Floats, Ints], other: tuple[Floats, Ints], diagonal: float, samples: int = SAMPLES
+) -> Distances:
+    """Distances between two triangle meshes ``(positions, triangles)``, from samples on both."""
+    squares, largest = [], 0.0
+    for here, there in ((one, other), (other, one)):
+        points, _ = surface_samples(*here, samples)
+        distance = NearestPoints(*there).query(points)[2]
+        squares.append(float((distance**2).mean()))
+        largest = max(largest, float(distance.max()))
+    return Distances(float(np.sqrt(np.mean(squares))) / diagonal, largest / diagonal)
+
+
+def flat_triangles(mesh: PolygonMesh) -> tuple[Floats, Ints]:
+    """The polygons as triangles about the mean of their corners."""
+    sizes = mesh.face_sizes
+    middle = sum_over_faces(mesh.positions[mesh.face_vertices], mesh.face_offsets) / sizes[:, None]
+    following = np.arange(1, mesh.corner_count + 1)
+    following[mesh.face_offsets[1:] - 1] = mesh.face_offsets[:-1]
+    center = mesh.vertex_count + mesh.corner_faces
+    triangles = np.stack([mesh.face_vertices, mesh.face_vertices[following], center], axis=1)
+    return np.concatenate([mesh.positions, middle]), triangles
+
+
+def refined_triangles(mesh: PolygonMesh, level: int = LEVEL) -> tuple[Floats, Ints]:
+    """The mesh as `refine` makes it of the polygons, in triangles."""
+    from curvify.refinement import refine
+
+    dense = refine(mesh, level=level)
+    quads = dense.faces
+    return dense.positions, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
+
+
+def accuracy(mesh: PolygonMesh, dense: Triangles, samples: int = SAMPLES) -> dict[str, Distances]:
+    """Distances of the flat polygons and of their refinement from the dense mesh."""
+    original = dense.positions, dense.vertices
+    return {
+        "flat": two_way_distances(flat_triangles(mesh), original, dense.diagonal, samples),
+        "refined": two_way_distances(refined_triangles(mesh), original, dense.diagonal, samples),
+    }
