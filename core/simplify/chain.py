@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from curvify.simplify.decompose import Partition, polygonize
 from curvify.simplify.features import find_creases, flat_polygons, sector_normals, sharp_half_edges
 from curvify.simplify.merge import FREE, PRESSED, drop_vertices, merge
 from curvify.simplify.polygons import Polygons
+from curvify.simplify.regions import bisect
 from curvify.simplify.triangles import Triangles, face_components, prepare_triangles
 from curvify.simplify.vsa import COMPACT_SWEEPS, SWEEPS, Metric, cluster, exchange
 from curvify.words import count_of
@@ -24,7 +25,11 @@ FIRST_SHARE = 0.5
 #: Attempts at the number of regions, and the surplus of polygons that merging may take away well.
 ATTEMPTS, SURPLUS = 8, 1.06
 #: Polygons a region from which on chords are allowed more, by what factor and how often.
-PIECES, LOOSER, LOOSEST = 1.75, 1.5, 6
+PIECES, LOOSER, LOOSEST = 1.75, 1.5, 4
+#: The least factor on the tolerance, where the number cannot be reached otherwise.
+CLOSEST = 0.05
+#: Fewer regions must bring at least this much: below lies what topology and creases ask for.
+FLOOR = 0.9
 #: How far borders may leave their chords, as shares of the size of a polygon: on creases and boundaries, and elsewhere.
 SHARP_TOLERANCE, SMOOTH_TOLERANCE = 0.12, 0.4
 #: How far dropping a vertex of a crease or a boundary may move that, as a share of the same.
@@ -81,11 +86,14 @@ class Simplified:
 
 @dataclass(eq=False)
 class _Attempt:
-    """Polygons from so many regions; ``drop`` how far dropping vertices may move creases."""
+    """Polygons from regions ``labels``, before merging ``unmerged``; ``drop`` how far dropping vertices may move creases."""
 
     polygons: Polygons
     creases: Bools
     labels: Ints
+    unmerged: Polygons
+    sharp: Bools
+    tolerance: Tolerance
     drop: float
 
 
@@ -95,7 +103,7 @@ def simplify(mesh: PolygonMesh, options: Options, progress: Progress | None = No
     metric = Metric.of(dense)
     if options.faces is not None and options.faces >= dense.face_count:
         notes.append(f"the mesh has only {count_of(dense.face_count, 'triangle')}; they are kept as they are")
-        attempt = _attempt(dense, metric, np.arange(dense.face_count), options, dense.face_count)
+        attempt = _as_they_are(dense, metric, options)
     else:
         attempt = _search(dense, metric, options, notes, progress)
     polygons, creases = attempt.polygons, attempt.creases
@@ -114,6 +122,15 @@ def simplify(mesh: PolygonMesh, options: Options, progress: Progress | None = No
     return result
 
 
+def _as_they_are(dense: Triangles, metric: Metric, options: Options) -> _Attempt:
+    """Every triangle a polygon."""
+    labels = np.arange(dense.face_count)
+    sharp, tolerance = sharp_half_edges(dense, options.sharp_angle), Tolerance(0.0, 0.0)
+    polygons = polygonize(Partition(dense, metric, sharp, tolerance, options.split_rule, labels))
+    creases = find_creases(dense, metric, labels, polygons)
+    return _Attempt(polygons, creases, labels, polygons, sharp, tolerance, 0.0)
+
+
 def _search(
     dense: Triangles, metric: Metric, options: Options, notes: list[str], progress: Progress | None
 ) -> _Attempt:
@@ -124,7 +141,7 @@ def _search(
         return _attempt(dense, metric, exchange(dense, metric, labels, SWEEPS), options, options.proxies)
     wanted = options.faces or 1
     labels, count, least = start, max(int(wanted * FIRST_SHARE), 1), int(start.max()) + 1
-    loose, low, high = 1.0, 0, dense.face_count
+    loose, low, high, last = 1.0, 0, dense.face_count, dense.face_count
     best: _Attempt | None = None
     for _ in range(ATTEMPTS):
         labels = cluster(dense, metric, count, labels if count > int(labels.max()) else start)
@@ -134,22 +151,49 @@ def _search(
             best = attempt
         if wanted <= found <= SURPLUS * wanted:
             break
+        if made < count:  # no error is left that more regions could lower: closer borders may
+            if loose <= CLOSEST or found >= wanted:
+                break
+            loose /= LOOSER**2
+            continue
         if found < wanted:
             low = count
             count = min(int(np.ceil(count * wanted / found * 1.02)), (count + high + 1) // 2)
-            if made < low:
-                break
         elif found > PIECES * (int(attempt.labels.max()) + 1) and loose < LOOSER**LOOSEST:
             loose *= LOOSER
             high = dense.face_count
             continue
         else:
-            high = count
+            if low == 0 and found > FLOOR * last:
+                break
+            high, last = count, found
             count = max(int(count * wanted / found), count // 3, (low + count) // 2 if low else 1)
         if not low < count < high or count < least:
             break
     assert best is not None
+    if best.polygons.count < wanted:
+        best = _fill(dense, metric, best, options, wanted)
     return _reduce(dense, best, wanted, notes)
+
+
+def _fill(dense: Triangles, metric: Metric, attempt: _Attempt, options: Options, wanted: int) -> _Attempt:
+    """More polygons where regions cannot tell more: free merging ends sooner, and the largest regions are halved."""
+    labels, whole = attempt.labels, attempt.unmerged
+    for _ in range(ATTEMPTS):
+        missing = wanted - whole.count
+        if missing <= 0:
+            break
+        sizes = np.bincount(labels, metric.weights) * (np.bincount(labels) > 1)
+        largest = np.argsort(-sizes, kind="stable")[:missing]
+        largest = largest[sizes[largest] > 0]
+        if not len(largest):
+            break
+        labels = bisect(dense, labels, largest)
+        partition = Partition(dense, metric, attempt.sharp, attempt.tolerance, options.split_rule, labels)
+        whole, labels = polygonize(partition), partition.labels
+    creases = find_creases(dense, metric, labels, whole)
+    polygons, creases = merge(dense.positions, whole, creases, FREE, wanted)
+    return replace(attempt, polygons=polygons, creases=creases, labels=labels)
 
 
 def _distance(found: int, wanted: int) -> float:
@@ -170,11 +214,12 @@ def _attempt(
     tolerance = Tolerance(loose * SHARP_TOLERANCE * size, loose * SMOOTH_TOLERANCE * size, min(SHARE * loose, 0.7))
     sharp = sharp_half_edges(dense, options.sharp_angle)
     partition = Partition(dense, metric, sharp, tolerance, options.split_rule, labels)
-    polygons = polygonize(partition)
-    creases = find_creases(dense, metric, partition.labels, polygons)
-    polygons, creases = merge(dense.positions, polygons, creases, FREE, 1)
-    polygons, creases = drop_vertices(dense.positions, polygons, creases, loose * DROP_TOLERANCE * size)
-    return _Attempt(polygons, creases, partition.labels, loose * DROP_TOLERANCE * size)
+    whole = polygonize(partition)
+    creases = find_creases(dense, metric, partition.labels, whole)
+    polygons, creases = merge(dense.positions, whole, creases, FREE, 1)
+    drop = loose * DROP_TOLERANCE * size
+    polygons, creases = drop_vertices(dense.positions, polygons, creases, drop)
+    return _Attempt(polygons, creases, partition.labels, whole, sharp, tolerance, drop)
 
 
 def _reduce(dense: Triangles, attempt: _Attempt, wanted: int, notes: list[str]) -> _Attempt:
@@ -190,7 +235,7 @@ def _reduce(dense: Triangles, attempt: _Attempt, wanted: int, notes: list[str]) 
         )
     elif polygons.count < (1 - CLOSE) * wanted:
         notes.append(f"{count_of(polygons.count, 'face')} hold everything; more would add nothing")
-    return _Attempt(polygons, creases, attempt.labels, attempt.drop)
+    return replace(attempt, polygons=polygons, creases=creases)
 
 
 def _coarse_mesh(mesh: PolygonMesh, dense: Triangles, attempt: _Attempt) -> Simplified:
