@@ -64,6 +64,12 @@ class Progress:
             self.bar.n = done
             self.bar.refresh()
 
+    def stage(self, name: str, share: float) -> None:
+        """The ``share`` of all work that is done, and the ``name`` of what is being done now."""
+        if self.bar is not None:
+            self.bar.set_description_str(f"{self.label}: {name}", refresh=False)
+        self(round(1000 * share), 1000)
+
     def _open(self, of: int) -> Any:
         from tqdm import tqdm
 

@@ -13,8 +13,9 @@ from curvify.schemes import NAMES
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-SURFACE, SHARP, MESH, OUTPUT, RUNNING, MESSAGES = (
+SURFACE, SIMPLIFYING, SHARP, MESH, OUTPUT, RUNNING, MESSAGES = (
     "Surface",
+    "Simplifying",
     "Sharp features",
     "Input mesh",
     "Output",
@@ -168,6 +169,38 @@ overveld = with_options(
         callback=face_list,
         help="overveld: keep these faces plane, for example 3,7-9 (counted from 0).",
     ),
+)
+
+# --- simplifying ------------------------------------------------------------------------------------------------
+
+faces = option(SIMPLIFYING, "--faces", type=POSITIVE, metavar="N", help="How many polygons there should be.")
+proxies = option(
+    SIMPLIFYING, "--proxies", type=POSITIVE, metavar="K", help="How many regions to make polygons of, instead of --faces."
+)
+compactness = option(
+    SIMPLIFYING,
+    "--compactness",
+    type=click.FloatRange(min=0),
+    default=4.0,
+    show_default=True,
+    metavar="L",
+    help="Weight of short regions against flat ones; try 16 for smooth organic shapes, 0 for flat ones only.",
+)
+dense_angle = option(
+    SIMPLIFYING,
+    "--sharp-angle",
+    type=click.FloatRange(min=0, max=180, min_open=True),
+    default=30.0,
+    show_default=True,
+    metavar="DEG",
+    help="Where the triangles of IN turn by more than this, they are sharp.",
+)
+simplify = option(
+    SIMPLIFYING,
+    "--simplify",
+    type=POSITIVE,
+    metavar="N",
+    help="First turn IN into N polygons, as 'curvify simplify --faces N' does.",
 )
 
 # --- input ------------------------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ EXAMPLES = (
     ("Finer, as triangles, with measurements", "curvify refine coarse.obj dense.stl -k 8 --report dense.json"),
     ("Sharp edges where faces turn by more than 40 degrees", "curvify refine coarse.obj dense.ply --sharp-angle 40"),
     ("How large would that be?", "curvify refine coarse.obj dense.ply -k 100 --dry-run"),
+    ("A dense scan as a smooth surface over 500 polygons", "curvify refine coarse.obj smooth.ply --simplify 500"),
     (
         "In a pipeline",
         "cat coarse.obj | curvify refine - - --input-format obj --output-format ply > dense.ply",
@@ -36,6 +37,7 @@ EXAMPLES = (
     options.kappa,
     options.crease_units,
     options.overveld,
+    options.simplify,
     options.marks,
     options.sharp_angle,
     options.sharp_from,

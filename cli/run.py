@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import time
 from collections.abc import Iterator
@@ -60,6 +61,7 @@ class Request:
     alpha: float | None
     bulge: float | None
     normals: str | None
+    simplify: int | None
     marks: str | None
     sharp_angle: float | None
     sharp_from: str | None
@@ -149,6 +151,7 @@ class Run:
         return {
             **plain_options(self.options),
             "marks": request.marks,
+            "simplify": request.simplify,
             "precision": self.dtype.name,
             "triangulate": self.triangulate,
             "weld_normals": request.weld_normals,
@@ -165,10 +168,14 @@ def refine_file(request: Request) -> Run:
     seconds: dict[str, float] = {}
     with timed(seconds, "read"):
         mesh = files.read_input(request.input, request.input_format)
+    notes: list[str] = []
+    if request.simplify is not None:
+        with timed(seconds, "simplify"):
+            mesh, notes = _simplified(request, mesh, console)
     marks = None if request.marks is None else read_marks(request.marks)
     with timed(seconds, "prepare"), files.naming(request.source, MeshError):
         made = refinable(mesh, request.scheme, **request.scheme_options, marks=marks)
-    warnings = [f"{request.source}: {text}" for text in made.warnings]
+    warnings = [f"{request.source}: {text}" for text in [*notes, *made.warnings]]
     for text in warnings:
         console.warn(text)
     threads = request.threads or processors()
@@ -179,6 +186,24 @@ def refine_file(request: Request) -> Run:
     else:
         _refine(run, console)
     return run
+
+
+def _simplified(request: Request, mesh: PolygonMesh, console: Console) -> tuple[PolygonMesh, list[str]]:
+    """The polygons that `simplify` would write for IN as OBJ, and what it would warn of.
+
+    They go through the text of an OBJ file, so that one command gives the bytes of two.
+    """
+    from curvify.formats import read_mesh, write_stream
+    from curvify.simplify import Options, simplify
+
+    given = {name: getattr(request, name) for name in ("weld", "split_rule") if getattr(request, name) is not None}
+    options = Options(faces=request.simplify, **given)
+    with files.naming(request.source, MeshError), console.progress(request.source) as progress:
+        result = simplify(mesh, options, progress.stage)
+    text = io.BytesIO()
+    write_stream(result.mesh, text, "obj")
+    text.seek(0)
+    return read_mesh("-", "obj", text), result.warnings
 
 
 def read_marks(path: str) -> Marks:

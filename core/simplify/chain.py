@@ -80,7 +80,7 @@ class Simplified:
     polygons: Polygons
     labels: Ints
     creases: Bools
-    counts: dict[str, int] = field(default_factory=dict)
+    counts: dict[str, int]
     warnings: list[str] = field(default_factory=list)
 
 
@@ -98,27 +98,23 @@ class _Attempt:
 
 
 def simplify(mesh: PolygonMesh, options: Options, progress: Progress | None = None) -> Simplified:
-    """Few convex polygons for a dense mesh. Raises MeshError where there is nothing to simplify."""
+    """Few convex polygons for a dense mesh. Raises MeshError where there is nothing to simplify.
+
+    ``progress(stage, share)`` is told what is being done and the share of all work that is behind.
+    """
+    tell = progress or (lambda stage, share: None)
+    tell("cleaning", 0.0)
     dense, notes = prepare_triangles(mesh, options.weld)
     metric = Metric.of(dense)
     if options.faces is not None and options.faces >= dense.face_count:
         notes.append(f"the mesh has only {count_of(dense.face_count, 'triangle')}; they are kept as they are")
         attempt = _as_they_are(dense, metric, options)
     else:
-        attempt = _search(dense, metric, options, notes, progress)
-    polygons, creases = attempt.polygons, attempt.creases
-    check_polygons(dense, polygons)
+        attempt = _search(dense, metric, options, notes, tell)
+    tell("normals", 0.95)
+    check_polygons(dense, attempt.polygons)
     result = _coarse_mesh(mesh, dense, attempt)
     result.warnings = [*mesh.warnings, *notes]
-    result.counts = {
-        "input_faces": mesh.face_count,
-        "triangles": dense.face_count,
-        "regions": int(attempt.labels.max()) + 1,
-        "faces": polygons.count,
-        "vertices": result.mesh.vertex_count,
-        "crease_edges": len(result.mesh.marks.crease_edges),
-        "flat_faces": len(result.mesh.marks.flat_faces),
-    }
     return result
 
 
@@ -132,7 +128,7 @@ def _as_they_are(dense: Triangles, metric: Metric, options: Options) -> _Attempt
 
 
 def _search(
-    dense: Triangles, metric: Metric, options: Options, notes: list[str], progress: Progress | None
+    dense: Triangles, metric: Metric, options: Options, notes: list[str], tell: Progress
 ) -> _Attempt:
     """Find the number of regions that gives the polygons wanted, and merge those that are too many."""
     start = face_components(dense)
@@ -143,8 +139,10 @@ def _search(
     labels, count, least = start, max(int(wanted * FIRST_SHARE), 1), int(start.max()) + 1
     loose, low, high, last = 1.0, 0, dense.face_count, dense.face_count
     best: _Attempt | None = None
-    for _ in range(ATTEMPTS):
+    for attempts in range(ATTEMPTS):
+        tell("regions", 0.9 * (1 - 0.5**attempts))
         labels = cluster(dense, metric, count, labels if count > int(labels.max()) else start)
+        tell("polygons", 0.9 * (1 - 0.7 * 0.5**attempts))
         attempt = _attempt(dense, metric, labels, options, wanted, loose)
         found, made = attempt.polygons.count, int(labels.max()) + 1
         if best is None or _distance(found, wanted) < _distance(best.polygons.count, wanted):
@@ -253,7 +251,16 @@ def _coarse_mesh(mesh: PolygonMesh, dense: Triangles, attempt: _Attempt) -> Simp
         marks=_marks(dense, attempt, number),
         position_dtype=mesh.position_dtype,
     )
-    return Simplified(result, dense, polygons, attempt.labels, creases)
+    counts = {
+        "input_faces": mesh.face_count,
+        "triangles": dense.face_count,
+        "regions": int(attempt.labels.max()) + 1,
+        "faces": polygons.count,
+        "vertices": result.vertex_count,
+        "crease_edges": len(result.marks.crease_edges),
+        "flat_faces": len(result.marks.flat_faces),
+    }
+    return Simplified(result, dense, polygons, attempt.labels, creases, counts)
 
 
 def _marks(dense: Triangles, attempt: _Attempt, number: Ints) -> Marks:
