@@ -175,7 +175,7 @@ overveld = with_options(
 
 faces = option(SIMPLIFYING, "--faces", type=POSITIVE, metavar="N", help="How many polygons there should be.")
 proxies = option(
-    SIMPLIFYING, "--proxies", type=POSITIVE, metavar="K", help="How many regions to make polygons of, instead of --faces."
+    SIMPLIFYING, "--proxies", type=POSITIVE, metavar="K", help="Make polygons of so many regions, instead of --faces."
 )
 compactness = option(
     SIMPLIFYING,

@@ -39,7 +39,7 @@ EXAMPLES = (
 def command(**given: Any) -> None:
     """Turn a dense triangle mesh into few convex polygons that refine back to it.
 
-    The polygons are nearly planar, and their vertices are vertices of IN. Normals, creases and flat faces are taken
+    The polygons are nearly planar, and their vertices lie on IN. Normals, creases and flat faces are taken
     from IN and written along, so that 'curvify refine' needs no options to come back close to it. Closed meshes stay
     closed, and the topology stays as it is. The same input gives the same bytes.
     """
@@ -120,7 +120,7 @@ def _write_report(
     from curvify.simplify.accuracy import accuracy
 
     with timed(seconds, "measure"):
-        distances = accuracy(result.mesh, result.dense)
+        distances = accuracy(result.mesh, result.original)
     write_report(
         path,
         {

@@ -23,7 +23,7 @@ from curvify.simplify.triangles import Triangles
 #: Sweeps of exchange after each doubling, at the end, and with the compactness term.
 LEVEL_SWEEPS, SWEEPS, COMPACT_SWEEPS = 6, 40, 40
 #: Sweeps between two looks for regions that have come apart.
-SETTLE_EVERY = 4
+SETTLE_EVERY = 8
 #: Gains below this share of a face's weight are rounding.
 LEAST_GAIN = 1e-12
 
@@ -147,13 +147,15 @@ def exchange(mesh: Triangles, metric: Metric, labels: Ints, sweeps: int) -> Ints
 def _moves(metric: Metric, neighbors: Ints, labels: Ints, count: int, sweep: int) -> tuple[Ints, Ints]:
     """Faces that change region in one sweep, and their new regions: no two of them are neighbors."""
     across = np.where(neighbors < 0, labels[:, None], labels[neighbors])
-    faces = np.flatnonzero((across != labels[:, None]).any(axis=1))
-    across = across[faces]
-    gain = _gains(metric, labels, count, faces, across)
-    best = np.argmax(gain, axis=1)
-    every = np.arange(len(faces))
-    good = gain[every, best] > LEAST_GAIN * metric.weights[faces]
-    faces, targets = faces[good], across[every, best][good]
+    faces, side = np.nonzero(across != labels[:, None])
+    targets = across[faces, side]
+    gain = _gains(metric, labels, count, faces, targets)
+    first = np.flatnonzero(np.diff(faces, prepend=-1))
+    best = np.maximum.reduceat(gain, first) if len(first) else gain
+    width = np.diff(np.append(first, len(faces)))
+    chosen = np.flatnonzero((gain == np.repeat(best, width)) & (gain > LEAST_GAIN * metric.weights[faces]))
+    chosen = chosen[np.diff(faces[chosen], prepend=-1) != 0]
+    faces, targets = faces[chosen], targets[chosen]
     # Of neighbors that both want to move, the one with the larger number of a hash does.
     rank = np.full(len(labels) + 1, -1, dtype=np.int64)
     rank[faces] = ((faces + 1) * 2654435761 + sweep * 40503) % 4294967291
@@ -162,25 +164,26 @@ def _moves(metric: Metric, neighbors: Ints, labels: Ints, count: int, sweep: int
 
 
 def _gains(metric: Metric, labels: Ints, count: int, faces: Ints, targets: Ints) -> Floats:
-    """How much the error falls when ``faces (n,)`` alone move to each of the regions ``targets (n,3)``."""
+    """How much the error falls when each of the ``faces (n,)`` alone moves to its region of ``targets (n,)``."""
     mass = np.bincount(labels, metric.weights, count)
     total = sum_by(labels, metric.normals, count)
+    length = np.sqrt(np.einsum("ki,ki->k", total, total))
     own = labels[faces]
     step = metric.normals[faces]
-    left = np.linalg.norm(total[own] - step, axis=1) - np.linalg.norm(total, axis=1)[own]
-    joined = np.linalg.norm(total[targets] + step[:, None], axis=2) - np.linalg.norm(total, axis=1)[targets]
-    gain = 2 * (left[:, None] + joined)
-    weight = metric.weights[faces]
+    left, joined = total[own] - step, total[targets] + step
+    gain = np.sqrt(np.einsum("ni,ni->n", left, left)) - length[own]
+    gain += np.sqrt(np.einsum("ni,ni->n", joined, joined)) - length[targets]
+    gain *= 2
     if metric.compactness > 0:
+        weight = metric.weights[faces]
         middle = sum_by(labels, metric.centers, count) / np.maximum(mass, 1e-300)[:, None]
         place = metric.centers[faces] / np.maximum(weight, 1e-300)[:, None]
-        rest = mass[own] - weight
-        leave = weight * mass[own] / np.maximum(rest, 1e-9 * mass[own]) * ((place - middle[own]) ** 2).sum(axis=1)
-        there = ((place[:, None] - middle[targets]) ** 2).sum(axis=2)
-        join = weight[:, None] * mass[targets] / np.maximum(mass[targets] + weight[:, None], 1e-300) * there
-        gain += metric.compactness * (leave[:, None] - join)
-    sizes = np.bincount(labels, minlength=count)
-    gain[(targets == own[:, None]) | (sizes[own] < 2)[:, None]] = -np.inf
+        away, towards = place - middle[own], place - middle[targets]
+        rest = np.maximum(mass[own] - weight, 1e-9 * mass[own])
+        leave = mass[own] / np.maximum(rest, 1e-300) * np.einsum("ni,ni->n", away, away)
+        join = mass[targets] / np.maximum(mass[targets] + weight, 1e-300) * np.einsum("ni,ni->n", towards, towards)
+        gain += metric.compactness * weight * (leave - join)
+    gain[np.bincount(labels, minlength=count)[own] < 2] = -np.inf
     return gain
 
 

@@ -1,0 +1,83 @@
+"""`curvify simplify`: files in and out, one command or two, its report, its errors."""
+
+from __future__ import annotations
+
+import json
+
+import dense_meshes
+import pytest
+
+import curvify
+
+
+@pytest.fixture
+def torus(folder):
+    curvify.write(dense_meshes.torus(32, 16), folder / "torus.obj")
+    return folder / "torus.obj"
+
+
+def test_refining_with_simplify_gives_the_bytes_of_two_commands(call, folder, torus):
+    assert call("simplify", torus, "few.obj", "--faces", 40).code == 0
+    assert call("refine", "few.obj", "two.ply", "-k", 2).code == 0
+    assert call("refine", torus, "one.ply", "--simplify", 40, "-k", 2).code == 0
+    assert (folder / "one.ply").read_bytes() == (folder / "two.ply").read_bytes()
+
+
+def test_two_runs_give_the_same_bytes(call, process, folder, torus):
+    assert call("simplify", torus, "one.ply", "--faces", 40).code == 0
+    assert process("simplify", torus, "two.ply", "--faces", 40).code == 0
+    assert (folder / "one.ply").read_bytes() == (folder / "two.ply").read_bytes()
+
+
+@pytest.mark.parametrize("suffix", ["obj", "ply"])
+def test_normals_and_marks_are_written(call, folder, suffix):
+    assert call("simplify", "cube.obj", f"few.{suffix}", "--faces", 6).code == 0
+    mesh = curvify.read(folder / f"few.{suffix}")
+    assert mesh.face_count == 6
+    assert mesh.corner_normals is not None
+    assert mesh.marks.counts() == {"crease": 12, "flat": 6}
+    result = call("refine", f"few.{suffix}", "dense.ply", "--report", "-")
+    assert json.loads(result.out)["volume_ratio"] == pytest.approx(1, rel=1e-6)
+
+
+def test_the_report_tells_how_far_polygons_and_surface_are(call, torus):
+    result = call("simplify", torus, "few.obj", "--faces", 40, "--report", "-")
+    report = json.loads(result.out)
+    assert report["counts"]["faces"] == 40
+    assert report["counts"]["triangles"] == 1024
+    assert 0 < report["distances"]["refined"]["rms"] < report["distances"]["flat"]["rms"] < 0.05
+
+
+def test_compactness_proxies_and_angle_have_their_say(call, folder, torus):
+    plain = call("simplify", torus, "a.obj", "--proxies", 30).code
+    assert call("simplify", torus, "b.obj", "--proxies", 30, "--compactness", 0).code == plain == 0
+    assert call("simplify", torus, "c.obj", "--proxies", 30, "--sharp-angle", 5).code == 0
+    texts = [(folder / name).read_bytes() for name in ("a.obj", "b.obj", "c.obj")]
+    assert len(set(texts)) == 3
+    assert b"t crease" in texts[2]
+    assert b"t crease" not in texts[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["few.obj"], "give --faces"),
+        (["few.obj", "--faces", 9, "--proxies", 9], "either"),
+        (["few.obj", "--faces", 0], "--faces"),
+        (["few.obj", "--faces", 9, "--ascii"], "--ascii is for PLY"),
+        (["few.xyz", "--faces", 9], "unknown suffix"),
+        (["-", "--faces", 9, "--output-format", "ply", "--report", "-"], "cannot both be standard output"),
+    ],
+)
+def test_errors(call, folder, arguments, says):
+    result = call("simplify", "cube.obj", *arguments)
+    assert (result.code, result.out) == (2, b"")
+    assert says in result.err
+    assert len(result.err.splitlines()) == 1
+    assert not (folder / "few.obj").exists()
+
+
+def test_more_faces_than_there_are_is_a_warning(call):
+    result = call("simplify", "cube.obj", "few.obj", "--faces", 100)
+    assert result.code == 0
+    assert "kept as they are" in result.err
