@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from curvify.arrays import cross
-from curvify.mesh import Bools, Floats, Ints
+from curvify.mesh import Floats, Ints
 
-#: Candidates looked at first, and by how much their number grows where they do not settle it.
-CANDIDATES, GROWTH = 8, 4
+#: By how much the number of candidates grows, from 1, where they do not settle it.
+GROWTH = 6
 #: Query points worked on at once, times candidates.
 BLOCK = 400_000
 
@@ -31,38 +31,40 @@ class NearestPoints:
         self.corners = positions[triangles]
         pieces, self.faces = _small_pieces(self.corners)
         centers = pieces.mean(axis=1)
-        self.reach = float(np.sqrt(((pieces - centers[:, None]) ** 2).sum(axis=2).max(initial=0.0)))
+        self.reaches = np.sqrt(((pieces - centers[:, None]) ** 2).sum(axis=2).max(axis=1))
         self.tree: Any = cKDTree(centers)
 
     def query(self, points: Floats) -> tuple[Floats, Ints, Floats]:
         """Nearest point ``(n,3)`` to each of the ``points (n,3)``, its triangle ``(n,)`` and its distance ``(n,)``."""
-        nearest = np.empty((len(points), 3))
-        faces = np.empty(len(points), dtype=np.int64)
-        distance = np.empty(len(points))
-        open_ = np.arange(len(points))
-        count = min(CANDIDATES, len(self.faces))
+        places = np.empty((len(points), 3))
+        faces = np.full(len(points), len(self.corners))
+        distance = np.full(len(points), np.inf)
+        open_, seen, count = np.arange(len(points)), 0, 1
         while len(open_):
+            count = min(count, len(self.faces))
             rest = []
             for rows in np.array_split(open_, -(-len(open_) * count // BLOCK)):
-                nearest[rows], faces[rows], distance[rows], settled = self._among(points[rows], count)
-                rest.append(rows[~settled])
-            open_ = np.concatenate(rest)
-            count = min(count * GROWTH, len(self.faces))
-        return nearest, faces, distance
+                far, pieces = self.tree.query(points[rows], np.arange(seen + 1, count + 1))
+                row, column = np.nonzero(far - self.reaches[pieces] <= distance[rows, None])
+                self._improve(points, rows[row], self.faces[pieces[row, column]], places, faces, distance)
+                rest.append(rows[far[:, -1] <= distance[rows] + self.reaches.max()])
+            open_ = np.concatenate(rest) if count < len(self.faces) else rows[:0]
+            seen, count = count, count * GROWTH
+        return places, faces, distance
 
-    def _among(self, points: Floats, count: int) -> tuple[Floats, Ints, Floats, Bools]:
-        """The nearest point in the ``count`` nearest pieces' triangles, and whether no other can be nearer."""
-        far, pieces = self.tree.query(points, count)
-        far, pieces = far.reshape(len(points), count), pieces.reshape(len(points), count)
-        candidates = self.faces[pieces]
-        places = closest_points(points[:, None], self.corners[candidates])
-        square = ((places - points[:, None]) ** 2).sum(axis=2)
+    def _improve(
+        self, points: Floats, rows: Ints, candidates: Ints, places: Floats, faces: Ints, distance: Floats
+    ) -> None:
+        """Take into account that ``candidates (m,)`` are triangles near the points ``rows (m,)``."""
+        found = closest_points(points[rows], self.corners[candidates])
+        gap = np.sqrt(((found - points[rows]) ** 2).sum(axis=1))
         # Of equally near triangles the lowest, whatever the order of the tree.
-        best = np.lexsort((candidates, square), axis=1)[:, 0]
-        every = np.arange(len(points))
-        distance = np.sqrt(square[every, best])
-        settled = (far[:, -1] > distance + self.reach) | (count == len(self.faces))
-        return places[every, best], candidates[every, best], distance, settled
+        order = np.lexsort((candidates, gap, rows))
+        first = order[np.diff(rows[order], prepend=-1) != 0]
+        row, gap, candidate = rows[first], gap[first], candidates[first]
+        better = (gap < distance[row]) | ((gap == distance[row]) & (candidate < faces[row]))
+        row, first = row[better], first[better]
+        places[row], faces[row], distance[row] = found[first], candidates[first], gap[better]
 
 
 def _small_pieces(corners: Floats) -> tuple[Floats, Ints]:

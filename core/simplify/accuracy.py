@@ -12,7 +12,7 @@ from curvify.polygons import sum_over_faces
 from curvify.simplify.triangles import Triangles
 
 #: Samples on each of the two surfaces, and the level at which patches are measured.
-SAMPLES, LEVEL = 30_000, 4
+SAMPLES, LEVEL = 20_000, 4
 
 
 @dataclass(frozen=True)

@@ -201,6 +201,8 @@ def _surface_directions(
     chord = _chords(mesh, topology, ends)
     reach = REACH * np.linalg.norm(chord, axis=1)
     smooth = np.flatnonzero(~ends.lines)
+    if not len(smooth):
+        return chord
     first, count, faces, distance = _faces_near(mesh, ends.vertices[smooth], reach[smooth], ring_pairs)
     pair, which = ranges(first, count)
     end, face = smooth[which], faces[pair]

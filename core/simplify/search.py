@@ -64,8 +64,8 @@ class Options:
     def __post_init__(self) -> None:
         if (self.faces is None) == (self.proxies is None):
             raise OptionError("give either the number of faces or the number of proxies")
-        if min(self.faces or 1, self.proxies or 1) < 1:
-            raise OptionError("at least 1 face must be asked for")
+        if any(number is not None and number < 1 for number in (self.faces, self.proxies)):
+            raise OptionError("at least 1 face or proxy must be asked for")
         if not self.compactness >= 0:
             raise OptionError(f"the compactness must be 0 or more, not {self.compactness}")
         if not 0 < self.sharp_angle <= 180:
@@ -98,9 +98,11 @@ def as_they_are(dense: Triangles, metric: Metric, options: Options) -> Attempt:
 
 @dataclass(eq=False)
 class Search:
-    """Where the search stands: ``labels`` of ``count`` regions, ``compact`` the same made compact; ``loose`` the
-    factor on tolerances, ``eased`` the polygons before it was last raised, ``stiff`` once that helps no more; numbers of regions known to be too ``low`` and too ``high``; ``last`` the polygons that the
-    latter gave; ``spent`` once no error is left that more regions could lower.
+    """Where the search stands: ``labels`` of ``count`` regions, ``compact`` the same made compact.
+
+    ``loose`` is the factor on tolerances, ``eased`` the polygons before it was last raised, ``stiff`` says that this
+    helps no more. Numbers of regions known to be too ``low`` and too ``high``, ``last`` the polygons that the latter
+    gave; ``spent`` once no error is left that more regions could lower.
     """
 
     dense: Triangles

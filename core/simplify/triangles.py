@@ -131,6 +131,8 @@ def _cut(positions: Floats, triangles: Ints, notes: list[str]) -> Triangles:
     while True:
         roots, label = distinct(fans(topology))
         owners = topology.vertices[roots]
+        order = np.argsort(owners, kind="stable")  # vertices keep the order of the input
+        owners, label = owners[order], np.argsort(order, kind="stable")[label]
         count = len(roots)
         bad = topology.nonmanifold[topology.edge] & (topology.twin < 0)
         positions, topology = positions[owners], _relabeled(topology, positions[owners], label)
