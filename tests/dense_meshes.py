@@ -7,7 +7,6 @@ from collections.abc import Callable
 import numpy as np
 
 from curvify.mesh import PolygonMesh
-from curvify.pieces import split_mesh
 
 Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -62,7 +61,7 @@ def boxes(solid: np.ndarray, steps: int = 1) -> PolygonMesh:
             square = square if side else square[:, ::-1]
             start = 4 * sum(map(len, corners))
             quads = start + 4 * np.arange(len(square))[:, None]
-            triangles += [quads + [0, 1, 2], quads + [0, 2, 3]]
+            triangles += [quads + np.array([0, 1, 2]), quads + np.array([0, 2, 3])]
             corners.append(square)
     points = np.concatenate(corners).reshape(-1, 3)
     keys = points @ np.array([1, 4099, 4099**2])
@@ -82,10 +81,12 @@ def needles() -> PolygonMesh:
     count = 60
     angle = 2 * np.pi * np.arange(count) / count
     ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    points = np.concatenate([ring, ring + [0, 0, 20.0], [[0.97, 0, 0], [0.97, 0, 20.0]]])
+    top = np.array([0, 0, 20.0])
+    points = np.concatenate([ring, ring + top, [[0.97, 0, 0], [0.97, 0, 20.0]]])
     i, j = np.arange(count), (np.arange(count) + 1) % count
     walls = [np.stack([i, j, j + count], axis=1), np.stack([i, j + count, i + count], axis=1)]
-    caps = [np.stack([j, i, 0 * i + 2 * count], axis=1), np.stack([i + count, j + count, 0 * i + 2 * count + 1], axis=1)]
+    low, high = np.full(count, 2 * count), np.full(count, 2 * count + 1)
+    caps = [np.stack([j, i, low], axis=1), np.stack([i + count, j + count, high], axis=1)]
     return mesh_of(points, np.concatenate(walls + caps))
 
 
@@ -97,8 +98,3 @@ def pinched() -> PolygonMesh:
     fin = np.array([[*mesh.face_vertices[:2], mesh.vertex_count]])
     points = np.concatenate([mesh.positions, mesh.positions[mesh.face_vertices[:1]] + [-0.5, -0.5, -0.5]])
     return mesh_of(points, np.concatenate([mesh.face_vertices.reshape(-1, 3), fin]))
-
-
-def triangulated(mesh: PolygonMesh) -> PolygonMesh:
-    """The mesh with its faces cut into triangles."""
-    return split_mesh(mesh, max_sides=3)[0]

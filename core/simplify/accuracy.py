@@ -15,6 +15,10 @@ from curvify.simplify.triangles import Triangles
 SAMPLES, LEVEL = 20_000, 4
 
 
+#: A triangle mesh: positions ``(V,3)`` and triangles ``(F,3)``.
+Surface = tuple[Floats, Ints]
+
+
 @dataclass(frozen=True)
 class Distances:
     """Distances between two surfaces as shares of the bounding box's diagonal: ``rms`` the root of the mean of both
@@ -25,10 +29,8 @@ class Distances:
     max: float
 
 
-def two_way_distances(
-    one: tuple[Floats, Ints], other: tuple[Floats, Ints], diagonal: float, samples: int = SAMPLES
-) -> Distances:
-    """Distances between two triangle meshes ``(positions, triangles)``, from samples on both."""
+def two_way_distances(one: Surface, other: Surface, diagonal: float, samples: int = SAMPLES) -> Distances:
+    """Distances between two triangle meshes, from samples on both."""
     squares, largest = [], 0.0
     for here, there in ((one, other), (other, one)):
         points, _ = surface_samples(*here, samples)
@@ -38,7 +40,7 @@ def two_way_distances(
     return Distances(float(np.sqrt(np.mean(squares))) / diagonal, largest / diagonal)
 
 
-def flat_triangles(mesh: PolygonMesh) -> tuple[Floats, Ints]:
+def flat_triangles(mesh: PolygonMesh) -> Surface:
     """The polygons as triangles about the mean of their corners."""
     sizes = mesh.face_sizes
     middle = sum_over_faces(mesh.positions[mesh.face_vertices], mesh.face_offsets) / sizes[:, None]
@@ -49,7 +51,7 @@ def flat_triangles(mesh: PolygonMesh) -> tuple[Floats, Ints]:
     return np.concatenate([mesh.positions, middle]), triangles
 
 
-def refined_triangles(mesh: PolygonMesh, level: int = LEVEL) -> tuple[Floats, Ints]:
+def refined_triangles(mesh: PolygonMesh, level: int = LEVEL) -> Surface:
     """The mesh as `refine` makes it of the polygons, in triangles."""
     from curvify.refinement import refine
 

@@ -13,7 +13,7 @@ from curvify.simplify.triangles import Triangles, face_components, prepare_trian
 from curvify.words import count_of
 
 #: Meshes up to this many triangles are taken as they are, and larger ones reduced to it.
-LARGE = 250_000
+LARGE = 120_000
 #: Triangles to leave for each polygon wanted.
 PER_POLYGON = 40
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 
-import dense_meshes
 import pytest
 
 import curvify
+import dense_meshes
 
 
 @pytest.fixture

@@ -31,7 +31,8 @@ def test_closest_points_of_a_triangle_against_a_fine_grid():
     triangle = np.array([[0, 0, 0], [2, 0, 0], [0.5, 1, 0.3]])
     u, v = np.meshgrid(np.linspace(0, 1, 201), np.linspace(0, 1, 201))
     inside = u + v <= 1
-    grid = triangle[0] + u[inside][:, None] * (triangle[1] - triangle[0]) + v[inside][:, None] * (triangle[2] - triangle[0])
+    u, v = u[inside][:, None], v[inside][:, None]
+    grid = triangle[0] + u * (triangle[1] - triangle[0]) + v * (triangle[2] - triangle[0])
     queries = np.random.default_rng(1).uniform(-2, 3, (50, 3))
     found = np.linalg.norm(closest_points(queries, triangle) - queries, axis=1)
     coarse = np.linalg.norm(grid[:, None] - queries, axis=2).min(axis=0)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import dense_meshes
 import numpy as np
 import pytest
 
+import dense_meshes
 from curvify.errors import MeshError
 from curvify.mesh import PolygonMesh
 from curvify.simplify.triangles import face_components, prepare_triangles

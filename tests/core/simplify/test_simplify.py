@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import dense_meshes
 import numpy as np
 import pytest
 
 import curvify
+import dense_meshes
 from curvify.errors import OptionError
 from curvify.mesh import PolygonMesh
 from curvify.simplify import Options, simplify

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import dense_meshes
 import numpy as np
 import pytest
 
+import dense_meshes
 from curvify.simplify import vsa
 from curvify.simplify.regions import bisect, make_discs, not_discs
 from curvify.simplify.triangles import Triangles, face_components, prepare_triangles
