@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from curvify.convex import Split, split_polygons
+from curvify.convex import DOUBLED, UNSPLIT, Split, split_polygons
 from curvify.errors import MeshError
 from curvify.mesh import Bools, Floats, Ints
 from curvify.simplify.borders import Borders, Chords, Tolerance, chords_of, farthest, find_anchors, region_borders
@@ -57,23 +57,22 @@ class Partition:
         """Normal of each region ``(K,3)``."""
         return proxies(self.metric, self.labels, self.count)
 
-    def relabel(self, labels: Ints, cut: Ints) -> None:
-        """Take labels in which the regions ``cut`` were cut."""
+    def relabel(self, labels: Ints, cut: Ints | tuple[()]) -> None:
+        """Take labels with more regions; those ``cut`` begin anew, as the fresh ones do."""
         fresh = int(labels.max()) + 1 - self.count
         self.labels = labels
-        self.tries[cut] = 0
+        self.tries[np.asarray(cut, dtype=np.int64)] = 0
         self.tries = np.concatenate([self.tries, np.zeros(fresh, dtype=np.int64)])
 
 
 def polygonize(partition: Partition) -> Polygons:
     """Convex polygons for all regions; the partition is mended on the way.
 
-    Raises MeshError if that does not come to an end.
+    A region of one face is taken as it is, needle or not. Raises MeshError if that does not come to an end.
     """
     flatten(partition)
     for _ in range(ROUNDS):
-        labels = make_discs(partition.mesh, partition.labels, lambda bad: None)
-        partition.relabel(labels, np.zeros(0, dtype=np.int64))
+        partition.relabel(make_discs(partition.mesh, partition.labels), ())
         mesh, normals = partition.mesh, partition.normals
         borders = region_borders(mesh, partition.labels, normals, partition.sharp_edges)
         anchors = find_anchors(mesh, borders, partition.forced, partition.tolerance)
@@ -114,17 +113,10 @@ def _failed_regions(partition: Partition, split: Split, normals: Floats) -> Bool
     shapes = shapes_of(partition.mesh.positions, split.face_vertices, sizes)
     facing = np.einsum("pi,pi->p", shapes.normals, normals[region])
     bad = ~shapes.acceptable | (facing <= FACING) | ((sizes == 3) & (shapes.least_sines < NEEDLE))
-    failed = (split.reasons & _hopeless()) != 0
+    failed: Bools = (split.reasons & (UNSPLIT | DOUBLED)) != 0
     failed[region[bad]] = True
-    failed &= np.bincount(partition.labels, minlength=partition.count) > 1
     failed[region[_pillows(split.face_vertices, sizes)]] = True
     return failed & (np.bincount(partition.labels, minlength=partition.count) > 1)
-
-
-def _hopeless() -> int:
-    from curvify.convex import DOUBLED, UNSPLIT
-
-    return UNSPLIT | DOUBLED
 
 
 def _pillows(vertices: Ints, sizes: Ints) -> Ints:

@@ -175,16 +175,15 @@ def drop_vertices(positions: Floats, polygons: Polygons, creases: Bools, toleran
 
 
 def _idle_half_edges(polygons: Polygons, topology: Topology, creases: Bools) -> Ints:
-    """One half-edge towards... a vertex of two polygons: the one that leaves it, in the lower polygon."""
+    """Half-edges that leave a vertex of two polygons, or of one on a boundary: one for each such vertex."""
     twin = topology.twin
-    leaving = np.arange(len(twin))
-    before = topology.prev[leaving]
+    leaving, before = np.arange(len(twin)), topology.prev
     degree = np.bincount(topology.edges.reshape(-1), minlength=topology.vertex_count)
     two = degree[polygons.vertices] == 2
-    inner = (twin[leaving] >= 0) & (twin[before] >= 0)
-    pair = inner & two & (leaving < topology.next[twin[leaving]])
-    rim = (twin[leaving] < 0) & (twin[before] < 0) & two
-    return np.flatnonzero((pair | rim) & (creases[leaving] == creases[before]))
+    inner = (twin >= 0) & (twin[before] >= 0)
+    pair = inner & two & (leaving < topology.next[twin])
+    rim = (twin < 0) & (twin[before] < 0) & two
+    return np.flatnonzero((pair | rim) & (creases == creases[before]))
 
 
 def _droppable(
@@ -214,11 +213,11 @@ def _droppable(
     one, other = face[sides[0][good]], face[sides[1][good]]
     name = name[fine][good]
     chosen = _best_apart(gap, one, other, polygons.count)
-    first = np.sort(distinct_first(name[chosen]))
+    first = np.sort(_first_of_each(name[chosen]))
     return here[chosen[first]]
 
 
-def distinct_first(keys: Ints) -> Ints:
+def _first_of_each(keys: Ints) -> Ints:
     """Index of the first of each set of equal keys."""
     order = np.argsort(keys, kind="stable")
     return order[np.diff(keys[order], prepend=-1) != 0]

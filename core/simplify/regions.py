@@ -6,15 +6,13 @@ two, by the geodesic Voronoi cells of two far faces, until none is left; a singl
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from curvify.arrays import distinct
 from curvify.mesh import Bools, Floats, Ints
 from curvify.simplify.triangles import Triangles
 
-#: Edges of one and the same length, so that faces without size can be told apart too.
+#: Least distance between neighbors, as a share of the diagonal, so that faces at one place lie apart too.
 LEAST_STEP = 1e-9
 
 
@@ -41,14 +39,9 @@ def not_discs(mesh: Triangles, labels: Ints) -> Bools:
     return (euler != 1) | pinched
 
 
-def make_discs(mesh: Triangles, labels: Ints, onward: Callable[[Ints], None] | None = None) -> Ints:
-    """Cut regions until all are discs; the new halves get the labels after the last.
-
-    ``onward`` is told the labels of the regions that were cut, each time.
-    """
+def make_discs(mesh: Triangles, labels: Ints) -> Ints:
+    """Cut regions until all are discs; the new halves get the labels after the last."""
     while (bad := np.flatnonzero(not_discs(mesh, labels))).size:
-        if onward is not None:
-            onward(bad)
         labels = bisect(mesh, labels, bad)
     return labels
 

@@ -14,7 +14,7 @@ import numpy as np
 from curvify.arrays import cross, distinct
 from curvify.convex import split_polygons
 from curvify.errors import MeshError
-from curvify.mesh import Bools, Floats, Ints, PolygonMesh
+from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.normals import unit
 from curvify.topology import Topology, build_topology, clean_loops, components, fans, weld_vertices
 from curvify.words import count_of
@@ -133,22 +133,18 @@ def _cut(positions: Floats, triangles: Ints, notes: list[str]) -> Triangles:
         owners = topology.vertices[roots]
         order = np.argsort(owners, kind="stable")  # vertices keep the order of the input
         owners, label = owners[order], np.argsort(order, kind="stable")[label]
-        count = len(roots)
-        bad = topology.nonmanifold[topology.edge] & (topology.twin < 0)
-        positions, topology = positions[owners], _relabeled(topology, positions[owners], label)
+        positions = positions[owners]
+        topology = build_topology(positions, offsets, label)
+        if len(distinct(fans(topology))[0]) > len(owners):
+            continue
         if not topology.nonmanifold.any():
-            if len(distinct(fans(topology))[0]) == count:
-                break
-        elif len(distinct(fans(topology))[0]) == count and bad.any():
-            positions, topology = _separate(positions, topology)
+            break
+        positions, topology = _separate(positions, topology)
+        offsets = topology.offsets
     touching = len(owners) - len(np.flatnonzero(np.bincount(owners)))
     if touching and not cut:
         notes.append(f"{count_of(touching, 'vertex', 'vertices')} where surfaces only touch taken apart")
     return Triangles(positions, topology.vertices.reshape(-1, 3), topology.twin)
-
-
-def _relabeled(topology: Topology, positions: Floats, vertices: Ints) -> Topology:
-    return build_topology(positions, topology.offsets, vertices)
 
 
 def _separate(positions: Floats, topology: Topology) -> tuple[Floats, Topology]:
@@ -167,7 +163,7 @@ def _separate(positions: Floats, topology: Topology) -> tuple[Floats, Topology]:
     return positions, build_topology(positions, offsets, triangles.reshape(-1))
 
 
-def face_components(mesh: Triangles, links: Bools | None = None) -> Ints:
-    """Component ``(F,)`` of each face, 0, 1, ... by their first faces; only across the dual edges ``links (D,)``."""
-    pairs = mesh.dual_edges if links is None else mesh.dual_edges[links]
+def face_components(mesh: Triangles) -> Ints:
+    """Component ``(F,)`` of each face, 0, 1, ... by their first faces."""
+    pairs = mesh.dual_edges
     return distinct(components(mesh.face_count, pairs[:, 0], pairs[:, 1]))[1]

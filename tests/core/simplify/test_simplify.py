@@ -151,7 +151,7 @@ def test_options_that_cannot_be_are_refused(options):
         Options(**options)
 
 
-@pytest.mark.parametrize("sample", ["pawn", "vase", "l_part", "torus"])
+@pytest.mark.parametrize("sample", ["pawn", "l_part"])
 def test_refined_samples_come_back(sample):
     dense = curvify.refine(curvify.read(SAMPLES / f"{sample}.obj"), level=3)
     mesh = PolygonMesh(dense.positions, 4 * np.arange(len(dense.faces) + 1), dense.faces.reshape(-1))
