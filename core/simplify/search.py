@@ -30,7 +30,7 @@ ATTEMPTS, SURPLUS = 8, 1.06
 #: Polygons a region from which on chords are allowed more, by what factor and how often.
 PIECES, LOOSER, LOOSEST = 1.75, 1.5, 4
 #: Larger tolerances must lower the number to this share, or they are not worth it.
-STIFF = 0.95
+STIFF = 0.98
 #: The least factor on the tolerance, where the number cannot be reached otherwise.
 CLOSEST = 0.05
 #: Fewer regions must bring at least this much: below lies what topology and creases ask for.
