@@ -123,7 +123,7 @@ def _without_doubles(triangles: Ints, notes: list[str]) -> Ints:
 
 def _cut(positions: Floats, triangles: Ints, notes: list[str]) -> Triangles:
     """Open whatever is not manifold: one vertex for each fan, until nothing changes."""
-    offsets = 3 * np.arange(len(triangles) + 1)
+    offsets: Ints = 3 * np.arange(len(triangles) + 1)
     topology = build_topology(positions, offsets, triangles.reshape(-1))
     cut = int(topology.nonmanifold.sum())
     if cut:
