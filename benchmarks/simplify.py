@@ -21,7 +21,7 @@ import numpy as np
 
 import curvify
 from curvify.mesh import PolygonMesh
-from curvify.nearest import NearestPoints, surface_samples
+from curvify.nearest import nearest_points, places_on, spread
 from curvify.normals import unit
 from curvify.simplify import Options, simplify
 from curvify.simplify.accuracy import Surface, flat_triangles, refined_triangles, two_way_distances
@@ -55,9 +55,10 @@ class Row:
 
 def normal_deviation(dense: Triangles, other: Surface, count: int = 20_000) -> float:
     """Root mean square angle in degrees between the dense faces' normals and those of the nearest other faces."""
-    points, faces = surface_samples(dense.positions, dense.vertices, count)
+    faces, weights = spread(dense.positions, dense.vertices, count)
+    points = places_on(dense.positions, dense.vertices[faces], weights)
     a, b, c = (other[0][other[1][:, i]] for i in range(3))
-    normals = unit(np.cross(b - a, c - a))[NearestPoints(*other).query(points)[1]]
+    normals = unit(np.cross(b - a, c - a))[nearest_points(points, *other)[1]]
     cosine = np.clip(np.einsum("ni,ni->n", normals, dense.normals[faces]), -1, 1)
     return float(np.degrees(np.sqrt((np.arccos(cosine) ** 2).mean())))
 

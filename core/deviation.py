@@ -13,6 +13,7 @@ import numpy as np
 from curvify.errors import MeshError
 from curvify.formats.others import triangulate
 from curvify.mesh import Floats, Ints, PolygonMesh
+from curvify.nearest import double_areas, nearest_points, places_on, spread
 from curvify.normals import degrees_between
 
 SAMPLES = 100_000
@@ -44,8 +45,7 @@ def as_triangles(mesh: PolygonMesh) -> Triangles:
     """The triangles of a mesh that have an area. Raises MeshError where there are none."""
     corners = triangulate(mesh)
     vertices = mesh.face_vertices[corners]
-    a, b, c = np.moveaxis(mesh.positions[vertices], 1, 0)
-    sized = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0
+    sized = double_areas(mesh.positions, vertices) > 0
     if not sized.any():
         raise MeshError("the mesh has no face with an area; there is no surface to measure from")
     return Triangles(mesh, mesh.positions, corners[sized], vertices[sized])
@@ -53,28 +53,7 @@ def as_triangles(mesh: PolygonMesh) -> Triangles:
 
 def nearest(points: Floats, surface: Triangles) -> tuple[Floats, Ints, Floats]:
     """Distance ``(n,)`` of points from a surface, the nearest triangle ``(n,)`` and the place there ``(n,3)``."""
-    import igl
-
-    square, triangle, place = igl.point_mesh_squared_distance(
-        np.ascontiguousarray(points, dtype=np.float64), surface.positions, surface.vertices
-    )[:3]
-    return np.sqrt(square), triangle, place
-
-
-def spread(surface: Triangles, count: int) -> tuple[Ints, Floats]:
-    """``count`` points spread evenly by area: triangle ``(n,)`` and barycentric weights ``(n,3)`` of each.
-
-    Always the same ones: triangles at equal steps of the summed area, places in them by the plastic number's sequence
-    (M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018).
-    """
-    a, b, c = np.moveaxis(surface.positions[surface.vertices], 1, 0)
-    total = np.cumsum(np.linalg.norm(np.cross(b - a, c - a), axis=1))
-    triangles = np.searchsorted(total, (np.arange(count) + 0.5) / count * total[-1])
-    plastic = 1.32471795724474602596
-    u, v = np.mod(np.arange(1, count + 1)[:, None] / np.array([plastic, plastic**2]), 1).T
-    over = u + v > 1
-    u, v = np.where(over, 1 - u, u), np.where(over, 1 - v, v)
-    return np.minimum(triangles, len(total) - 1), np.stack([1 - u - v, u, v], axis=1)
+    return nearest_points(points, surface.positions, surface.vertices)
 
 
 @dataclass(frozen=True)
@@ -109,8 +88,8 @@ def surfaces_apart(a: PolygonMesh, b: PolygonMesh, samples: int = SAMPLES) -> Ap
     smooth = one.has_normals and other.has_normals
     distances, angles, tops = [], [], []
     for source, target in ((one, other), (other, one)):
-        triangles, weights = spread(source, samples)
-        points = np.einsum("nk,nki->ni", weights, source.positions[source.vertices[triangles]])
+        triangles, weights = spread(source.positions, source.vertices, samples)
+        points = places_on(source.positions, source.vertices[triangles], weights)
         far, hit, place = nearest(points, target)
         here = source.normals(triangles, weights, smooth)
         there = target.normals(hit, _weights(target, hit, place), smooth)

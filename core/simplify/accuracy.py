@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from curvify.mesh import Floats, Ints, PolygonMesh
-from curvify.nearest import NearestPoints, surface_samples
+from curvify.nearest import nearest_points, places_on, spread
 from curvify.polygons import sum_over_faces
 from curvify.simplify.triangles import Triangles
 
@@ -33,8 +33,8 @@ def two_way_distances(one: Surface, other: Surface, diagonal: float, samples: in
     """Distances between two triangle meshes, from samples on both."""
     squares, largest = [], 0.0
     for here, there in ((one, other), (other, one)):
-        points, _ = surface_samples(*here, samples)
-        distance = NearestPoints(*there).query(points)[2]
+        triangles, weights = spread(*here, samples)
+        distance = nearest_points(places_on(here[0], here[1][triangles], weights), *there)[0]
         squares.append(float((distance**2).mean()))
         largest = max(largest, float(distance.max()))
     return Distances(float(np.sqrt(np.mean(squares))) / diagonal, largest / diagonal)

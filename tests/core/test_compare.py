@@ -8,7 +8,7 @@ import pytest
 import curvify
 from bodies import boxes
 from curvify.compare import compare_meshes, compare_surfaces
-from curvify.deviation import HEAT, as_triangles, deviations, heat_map, spread, surfaces_apart
+from curvify.deviation import HEAT, deviations, heat_map, surfaces_apart
 from curvify.formats.dense import to_polygon_mesh
 from curvify.mesh import PolygonMesh
 from surfaces import icosahedron, torus, uv_sphere
@@ -136,16 +136,6 @@ def test_a_tolerance_decides_about_surfaces():
     moved = boxes((0.01, 0, 0))
     assert not compare_surfaces(boxes((0, 0, 0)), moved, 0.009)[0][0].passed
     assert compare_surfaces(boxes((0, 0, 0)), moved, 0.011)[0][0].passed
-
-
-def test_samples_are_spread_by_area():
-    mesh = PolygonMesh.from_faces([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 3], [1, 0, 3]], [[0, 1, 2], [0, 4, 3]])
-    surface = as_triangles(mesh)
-    triangles, weights = spread(surface, 10_000)
-    assert np.mean(triangles == 1) == pytest.approx(0.75, abs=1e-3)
-    assert weights.min() >= 0
-    np.testing.assert_allclose(weights.sum(axis=1), 1)
-    np.testing.assert_allclose(weights[triangles == 1].mean(axis=0), 1 / 3, atol=0.01)
 
 
 def test_no_surface_no_distance():
