@@ -19,6 +19,7 @@ COMMANDS = {
     "check": "Check that a mesh is what it should be; the exit code tells.",
     "compare": "Compare two meshes; the exit code tells whether they agree.",
     "render": "Draw meshes side by side into a PNG picture.",
+    "view": "Write a web page that shows meshes, to turn, zoom and compare.",
     "curves": "Write the curves of a surface: edges, rims, silhouettes, cells.",
     "repair": "Mend what refine only warns of.",
     "split": "Cut concave and many-sided faces into convex ones.",

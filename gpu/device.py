@@ -108,7 +108,7 @@ class Device:
         """Raise DeviceError if OpenGL has met an error since the last check."""
         error = self.ctx.error
         if error != "GL_NO_ERROR":
-            raise DeviceError(f"OpenGL on {self.renderer} failed with {error}; try --backend cpu")
+            raise DeviceError(f"OpenGL on {self.renderer} failed with {error}; a smaller task or another device may do")
 
     def __post_init__(self) -> None:
         self._open = True

@@ -11,6 +11,7 @@ import numpy as np
 from curvify.gpu.colors import Color, Image, to_bytes, to_linear
 from curvify.gpu.device import Device, open_device
 from curvify.gpu.render import draw_panels
+from curvify.gpu.scale import draw_bar
 from curvify.gpu.scene import Panel, Settings
 
 if TYPE_CHECKING:
@@ -29,9 +30,9 @@ PENCIL: Color = (0.50, 0.51, 0.53)
 def picture(panels: Sequence[Panel], settings: Settings | None = None, device: Device | None = None) -> Image:
     """Panels side by side, ``(height,width,3)`` or, on no background, ``(height,width,4)``, uint8.
 
-    Every panel has the size that ``settings`` say; where any has a caption, a strip under each adds to it. ``device``
-    is opened and closed for this picture where none is given. Raises OptionError and MeshError for what cannot be
-    drawn, DeviceError where there is no OpenGL.
+    Every panel has the size that ``settings`` say; where any has a caption, a strip under each adds to it, and the bar
+    of a scale comes under all. ``device`` is opened and closed for this picture where none is given. Raises OptionError
+    and MeshError for what cannot be drawn, DeviceError where there is no OpenGL.
     """
     settings = settings or Settings()
     settings.check(len(panels))
@@ -43,7 +44,17 @@ def picture(panels: Sequence[Panel], settings: Settings | None = None, device: D
     captions = [panel.caption for panel in panels]
     if any(captions):
         parts = [_with_caption(part, text, settings) for part, text in zip(parts, captions, strict=True)]
-    return _grid(parts, settings)
+    image = _grid(parts, settings)
+    if settings.scale is None:
+        return image
+    ground = settings.background
+    bar = draw_bar(settings.scale, image.shape[1], _letters(settings.size), _ink(ground), ground)
+    return np.concatenate([image, bar])
+
+
+def _letters(size: tuple[int, int]) -> int:
+    """Height of letters for panels of a size."""
+    return max(LEAST_LETTERS, round(LETTERS * min(size)))
 
 
 def _grid(parts: Sequence[Image], settings: Settings) -> Image:
@@ -65,7 +76,7 @@ def _with_caption(image: Image, text: str, settings: Settings) -> Image:
     from PIL import ImageDraw
 
     height, width = image.shape[:2]
-    letters = max(LEAST_LETTERS, round(LETTERS * min(height, width)))
+    letters = _letters((width, height))
     strip = round(STRIP * letters)
     mask = Pillow.new("L", (width, strip))
     font, text = _fitting(text, letters, width - letters)

@@ -20,9 +20,9 @@ from curvify.gpu.camera import Camera
 from curvify.gpu.colors import NO_VALUE_COLOR, VALUE_COLORS, Image, parse_color, to_bytes, to_linear
 from curvify.gpu.device import Device
 from curvify.gpu.scene import Layer, Panel, Place, Settings, Stroke, place_panels
-from curvify.gpu.shading import shading_normals
-from curvify.gpu.triangles import Triangles, polygon_edges, to_triangles, used_vertices
-from curvify.mesh import Floats, PolygonMesh
+from curvify.gpu.shapes import Shapes
+from curvify.gpu.triangles import Triangles
+from curvify.mesh import Floats
 
 if TYPE_CHECKING:
     import moderngl
@@ -43,27 +43,30 @@ def draw_panels(panels: Sequence[Panel], settings: Settings, device: Device) -> 
     Raises OptionError and MeshError for what cannot be drawn, DeviceError where the device fails.
     """
     settings.check(len(panels))
-    meshes = [[layer.polygons() for layer in panel.layers] for panel in panels]
-    points = [_shown_points(panel.layers, polygons) for panel, polygons in zip(panels, meshes, strict=True)]
-    placed = place_panels(points, [panel.view or settings.view for panel in panels], settings)
-    with Painter(device, settings) as painter:
+    shapes = Shapes()
+    for panel in panels:
+        for layer in panel.layers:
+            layer.check(shapes.polygons(layer.mesh))
+    points = [_shown_points(panel.layers, shapes) for panel in panels]
+    meshes = [tuple(id(layer.mesh) for layer in panel.layers) for panel in panels]
+    placed = place_panels(points, [panel.view or settings.view for panel in panels], settings, meshes)
+    with Painter(device, settings, shapes) as painter:
         return [
-            painter.draw(panel.layers, polygons, place, camera)
-            for panel, polygons, (place, camera) in zip(panels, meshes, placed, strict=True)
+            painter.draw(panel.layers, place, camera) for panel, (place, camera) in zip(panels, placed, strict=True)
         ]
 
 
-def _shown_points(layers: Sequence[Layer], meshes: Sequence[PolygonMesh]) -> Floats:
+def _shown_points(layers: Sequence[Layer], shapes: Shapes) -> Floats:
     """The ends of everything in a panel ``(n,3)``: what the camera has to see."""
-    corners = [mesh.positions[used_vertices(mesh)] for mesh in meshes]
+    corners = [shapes.polygons(layer.mesh).positions[shapes.vertices(layer.mesh)] for layer in layers]
     return np.concatenate([*corners, *(part.points.reshape(-1, 3) for layer in layers for part in layer.lines)])
 
 
 class Painter:
     """Shaders and framebuffers of a device, for panels of one size; to be used as a context manager."""
 
-    def __init__(self, device: Device, settings: Settings) -> None:
-        self.device, self.settings = device, settings
+    def __init__(self, device: Device, settings: Settings, shapes: Shapes) -> None:
+        self.device, self.settings, self.shapes = device, settings, shapes
         self.size = settings.size[0] * FINER, settings.size[1] * FINER
         self._held = ExitStack()
 
@@ -105,14 +108,12 @@ class Painter:
             no_value_color=to_linear(parse_color(NO_VALUE_COLOR)),
         )
 
-    def draw(self, layers: Sequence[Layer], meshes: Sequence[PolygonMesh], place: Place, camera: Camera) -> Image:
-        """A panel of layers, whose polygons are ``meshes``, as ``(height,width,3|4)``."""
+    def draw(self, layers: Sequence[Layer], place: Place, camera: Camera) -> Image:
+        """A panel of layers as ``(height,width,3|4)``."""
         width, height = self.settings.size
         image = np.empty((height, width, 4 if self.settings.background is None else 3), dtype=np.uint8)
         with ExitStack() as held:
-            drawings = [
-                _Drawing(self, layer, mesh, place, camera, held) for layer, mesh in zip(layers, meshes, strict=True)
-            ]
+            drawings = [_Drawing(self, layer, place, camera, held) for layer in layers]
             for x, y, wide, high in _tiles(self.size):
                 self._begin(x, y, wide, high, camera)
                 for drawing in drawings:
@@ -155,27 +156,28 @@ class Painter:
 class _Drawing:
     """A layer on the device, ready to be drawn into any tile."""
 
-    def __init__(
-        self, painter: Painter, layer: Layer, mesh: PolygonMesh, place: Place, camera: Camera, held: ExitStack
-    ) -> None:
+    def __init__(self, painter: Painter, layer: Layer, place: Place, camera: Camera, held: ExitStack) -> None:
         self.painter, self.style, self.held = painter, layer.style, held
         self.ctx = painter.device.ctx
-        points = place(mesh.positions)
+        shapes, mesh = painter.shapes, layer.mesh
+        points = place(shapes.polygons(mesh).positions)
         shading = "flat" if layer.style == "hidden" else layer.shading
-        self.triangles = self._surface(to_triangles(mesh, shading_normals(mesh, shading)), points, layer)
+        self.triangles = self._surface(shapes.triangles(mesh, shading), points, layer)
         self.strokes = [self._lines(place(part.points), part.stroke) for part in layer.lines]
         if layer.wire is not None:
-            ends = points[polygon_edges(mesh)]
+            ends = points[shapes.edges(mesh)]
             self.strokes.append(self._lines(ends, _thinned(layer.wire, ends, camera, painter.settings.size)))
         if layer.dots is not None:
-            places = points[used_vertices(mesh)]
+            places = points[shapes.vertices(mesh)]
             self.strokes.append(self._lines(np.stack([places, places], axis=1), layer.dots))
         #: Lines of this width lie in front of the surface that they are on, however steep it is.
         self.lift = max((FINER * stroke.width / 2 + 1 for _, _, stroke in self.strokes), default=0.0)
 
     def _surface(self, mesh: Triangles, points: Floats, layer: Layer) -> moderngl.VertexArray:
         ctx, program = self.ctx, self.painter.surface
-        values = np.zeros(len(points)) if layer.values is None else _shares(layer.values, layer.limits)
+        scale = self.painter.settings.scale
+        limits = layer.limits if scale is None or layer.limits is not None else (scale.low, scale.high)
+        values = np.zeros(len(points)) if layer.values is None else shares(layer.values, limits)
         vertices = np.empty(len(mesh.vertices), dtype=[("position", "f4", 3), ("normal", "f4", 3), ("value", "f4")])
         vertices["position"], vertices["normal"] = points[mesh.vertices], mesh.normals
         vertices["value"] = values[mesh.vertices]
@@ -265,7 +267,7 @@ def _thinned(stroke: Stroke, ends: Floats, camera: Camera, size: tuple[int, int]
     return replace(stroke, width=min(stroke.width, WIDEST_WIRE * float(np.median(length))))
 
 
-def _shares(values: Floats, limits: tuple[float, float] | None) -> Floats:
+def shares(values: Floats, limits: tuple[float, float] | None) -> Floats:
     """Values as shares of the way from the lower to the upper limit, NaN where they are not finite."""
     finite = np.isfinite(values)
     if limits is None:
@@ -276,13 +278,14 @@ def _shares(values: Floats, limits: tuple[float, float] | None) -> Floats:
 
 
 @cache
-def _source(name: str) -> str:
+def shader_source(name: str) -> str:
+    """The text of a shader of the package: ``surface.frag`` and so on."""
     return (Path(__file__).parent / "shaders" / f"{name}.glsl").read_text()
 
 
 def _program(ctx: moderngl.Context, name: str) -> moderngl.Program:
     """The program of a vertex and a fragment shader."""
-    return ctx.program(vertex_shader=_source(f"{name}.vert"), fragment_shader=_source(f"{name}.frag"))
+    return ctx.program(vertex_shader=shader_source(f"{name}.vert"), fragment_shader=shader_source(f"{name}.frag"))
 
 
 def _set(program: moderngl.Program, **uniforms: Any) -> None:

@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from curvify.errors import MeshError, OptionError
-from curvify.formats.dense import to_polygon_mesh
 from curvify.gpu.camera import FIELD_OF_VIEW, UPS, VIEWS, WIDEST, Camera, fit_cameras, view_rotation
 from curvify.gpu.colors import Color
-from curvify.gpu.triangles import shown_faces
+from curvify.gpu.scale import Scale
 from curvify.mesh import DenseMesh, Floats, PolygonMesh
 from curvify.prepare import LARGEST_COORDINATE
 
@@ -47,8 +46,8 @@ class Layer:
     """A mesh and what is drawn with it. Each layer covers the ones before it, however near they are.
 
     ``style`` as in ``STYLES``, ``shading`` as in `curvify.gpu.shading`; ``wire`` draws the polygons' edges, ``dots``
-    their vertices. ``values (V,)`` are what the style ``values`` colors, from ``limits[0]`` to ``limits[1]`` (theirs by
-    default); NaN is gray.
+    their vertices. ``values (V,)`` are what the style ``values`` colors, from ``limits[0]`` to ``limits[1]`` (by
+    default those of the settings' scale, or else their own); NaN is gray.
     """
 
     mesh: PolygonMesh | DenseMesh
@@ -60,18 +59,13 @@ class Layer:
     values: Floats | None = None
     limits: tuple[float, float] | None = None
 
-    def polygons(self) -> PolygonMesh:
-        """The faces that are shown. Raises OptionError or MeshError for a layer that cannot be drawn."""
+    def check(self, polygons: PolygonMesh) -> None:
+        """Raise OptionError for a layer that cannot be drawn; ``polygons`` are its mesh's."""
         if self.style not in STYLES:
             raise OptionError(f"style must be one of {', '.join(STYLES)}, not {self.style!r}")
-        mesh = to_polygon_mesh(self.mesh) if isinstance(self.mesh, DenseMesh) else self.mesh
-        mesh.validate()
-        if self.style == "values" and (self.values is None or self.values.shape != (mesh.vertex_count,)):
-            raise OptionError(f"the style values needs a value for each of the mesh's {mesh.vertex_count} vertices")
-        mesh = shown_faces(mesh)
-        if not mesh.corner_count:
-            raise MeshError("the mesh has no faces; there is nothing to show")
-        return mesh
+        count = polygons.vertex_count
+        if self.style == "values" and (self.values is None or self.values.shape != (count,)):
+            raise OptionError(f"the style values needs a value for each of the mesh's {count} vertices")
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +82,10 @@ class Settings:
     """How a picture is taken.
 
     ``size``: width and height of a panel in pixels. ``background`` None is transparent. ``field_of_view`` in degrees, 0
-    for a parallel projection. ``fit``: the ``same`` camera for all panels, one for ``each``, or ``auto``: the same
+    for a parallel projection. ``fit``: the ``same`` camera for all panels, one for ``each`` mesh, or ``auto``: the same
     where all show about the same box. ``columns`` panels stand in a row, all by default. ``stripes``: dark bands of
     the room that a zebra mirrors, from floor to ceiling. ``color`` and ``back``: the two sides of a shaded surface.
+    ``scale``: what the colors of values mean, shown under the picture.
     """
 
     size: tuple[int, int] = (800, 600)
@@ -103,6 +98,7 @@ class Settings:
     stripes: int = 10
     color: Color = (153 / 255, 179 / 255, 209 / 255)
     back: Color = (0.84, 0.62, 0.48)
+    scale: Scale | None = None
 
     def check(self, panels: int) -> None:
         """Raise OptionError for what cannot be."""
@@ -136,9 +132,14 @@ class Place:
 
 
 def place_panels(
-    points: Sequence[Floats], views: Sequence[tuple[float, float]], settings: Settings
+    points: Sequence[Floats],
+    views: Sequence[tuple[float, float]],
+    settings: Settings,
+    meshes: Sequence[object] | None = None,
 ) -> list[tuple[Place, Camera]]:
     """For the points ``(n,3)`` and the view of each panel: where its world lies, and the camera that sees it.
+
+    Panels with equal entries of ``meshes`` show the same, and always share an eye.
 
     Raises MeshError for points that are too far away to be computed with.
     """
@@ -147,7 +148,7 @@ def place_panels(
         extent = float(np.abs(boxes).max())
         raise MeshError(f"a coordinate is as large as {extent:.3g}; scale the mesh below {LARGEST_COORDINATE:.0e}")
     together = settings.fit == "same" or (settings.fit == "auto" and nearly_same(boxes))
-    groups = [list(range(len(points)))] if together else [[k] for k in range(len(points))]
+    groups = [list(range(len(points)))] if together else _equal(meshes or range(len(points)))
     result: list[tuple[Place, Camera]] = [None] * len(points)  # type: ignore[list-item]
     for group in groups:
         low, high = boxes[group, 0].min(axis=0), boxes[group, 1].max(axis=0)
@@ -159,6 +160,14 @@ def place_panels(
         for k, camera in zip(group, cameras, strict=True):
             result[k] = place, camera
     return result
+
+
+def _equal(labels: Sequence[object]) -> list[list[int]]:
+    """Places of equal labels."""
+    groups: dict[object, list[int]] = {}
+    for k, label in enumerate(labels):
+        groups.setdefault(label, []).append(k)
+    return list(groups.values())
 
 
 def nearly_same(boxes: Floats) -> bool:

@@ -10,6 +10,7 @@ from curvify.arrays import cross, distinct
 from curvify.convex import split_polygons
 from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.polygons import next_corners
+from curvify.topology import weld_vertices
 
 
 @dataclass(eq=False)
@@ -96,9 +97,10 @@ def _fans(mesh: PolygonMesh) -> Ints:
 
 
 def polygon_edges(mesh: PolygonMesh) -> Ints:
-    """The edges of the polygons ``(E,2)`` as vertex ids, each once."""
-    heads = mesh.face_vertices[next_corners(mesh.face_offsets)]
-    low, high = np.minimum(mesh.face_vertices, heads), np.maximum(mesh.face_vertices, heads)
+    """The edges of the polygons ``(E,2)`` as vertex ids, each once, also where a file had to repeat their vertices."""
+    tails = weld_vertices(mesh.positions, mesh.face_offsets, mesh.face_vertices, "auto")[mesh.face_vertices]
+    heads = tails[next_corners(mesh.face_offsets)]
+    low, high = np.minimum(tails, heads), np.maximum(tails, heads)
     keys, _ = distinct(low * mesh.vertex_count + high)
     return np.stack([keys // mesh.vertex_count, keys % mesh.vertex_count], axis=1)
 

@@ -1,0 +1,219 @@
+"""What `render`, `view` and heat maps share: options of the look, meshes read, values of their vertices, files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from curvify.cli import options
+from curvify.cli.options import option
+
+if TYPE_CHECKING:
+    from curvify.cli.console import Console
+    from curvify.gpu.scene import Layer, Settings
+    from curvify.mesh import Floats, PolygonMesh
+
+PICTURE, LOOK = "Picture", "Look"
+#: Part of the curvatures at each end that the colors do not tell apart: a few vertices have extreme ones.
+EXTREME = 0.01
+
+
+class Limits(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """Two numbers in order, ``LOW,HIGH``."""
+
+    name = "limits"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+        """The two numbers."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            low, high = (float(part) for part in value.split(","))
+        except ValueError:
+            low, high = 1.0, 0.0
+        if not (float("-inf") < low <= high < float("inf")):
+            self.fail(f"'{value}' is not a range; give two numbers in order, as in 0,2.5")
+        return low, high
+
+
+style = option(
+    LOOK,
+    "--style",
+    type=click.Choice(["shaded", "zebra", "normals"]),
+    default="shaded",
+    show_default=True,
+    help="Light and shade; the reflection of a striped room, which breaks where the surface has a kink; normals "
+    "as colors.",
+)
+shading = option(
+    LOOK,
+    "--shading",
+    type=click.Choice(["auto", "flat", "smooth"]),
+    default="auto",
+    show_default=True,
+    help="Normals to shade with: the file's, or where it has none flat for coarse meshes and smooth for fine ones "
+    "(auto); each face's own (flat); averages at the vertices (smooth).",
+)
+values = option(
+    LOOK,
+    "--values",
+    type=click.Choice(["x", "y", "z", "bend", "curvature"]),
+    help="Colors for values of the vertices, with a scale: a coordinate; the largest angle between the faces there, in "
+    "degrees; the mean curvature.",
+)
+limits = option(
+    LOOK,
+    "--limits",
+    type=Limits(),
+    metavar="LOW,HIGH",
+    help="Values of the first and the last color.  [default: those of the meshes; of curvatures, all but 1 % at each "
+    "end]",
+)
+wire = option(LOOK, "--wire", is_flag=True, help="Draw the edges of the polygons.")
+control = option(LOOK, "--control", metavar="FILE", help="Draw the edges and vertices of this mesh over each IN.")
+stripes = option(
+    LOOK,
+    "--stripes",
+    type=options.POSITIVE,
+    default=10,
+    show_default=True,
+    metavar="N",
+    help="Dark bands of a zebra's room, from floor to ceiling.",
+)
+color = option(
+    LOOK,
+    "--color",
+    default="#99b3d1",
+    show_default=True,
+    metavar="COLOR",
+    help="Color of a shaded surface: a name that HTML knows, or #rrggbb.",
+)
+view = option(
+    PICTURE,
+    "--view",
+    default="oblique",
+    show_default=True,
+    metavar="VIEW",
+    help="oblique, front, right, back, left, top, bottom, isometric, or AZIMUTH,ELEVATION in degrees.",
+)
+up = option(
+    PICTURE,
+    "--up",
+    type=click.Choice(["z", "y"]),
+    default="z",
+    show_default=True,
+    help="The axis that points up; the front is then seen from -y or +z.",
+)
+
+
+def style_of(style: str, values: str | None, limits: tuple[float, float] | None) -> str:
+    """The style of the layers. Raises OptionError for options that do not go together."""
+    from curvify.errors import OptionError
+
+    if values is None and limits is not None:
+        raise OptionError("--limits are those of --values; say which values")
+    if values is not None and style != "shaded":
+        raise OptionError(f"--values and --style {style} both color the surface; leave out one of them")
+    return style if values is None else "values"
+
+
+def check_names(
+    names: list[str], output: str, suffix: str, rule: str, format: str | None, no_clobber: bool
+) -> None:
+    """Raise CurvifyError for names that cannot be read or written, so far as they tell; OUT must have a suffix."""
+    from pathlib import Path
+
+    from curvify.cli import files
+    from curvify.errors import FormatError, OptionError
+
+    if output != files.STREAM and Path(output).suffix.lower() != suffix:
+        raise FormatError(f"{output}: {rule}; give the last name the suffix {suffix}")
+    files.check_target(output, no_clobber)
+    if names.count(files.STREAM) > 1:
+        raise OptionError("standard input can be read only once")
+    for name in names:
+        if name != files.STREAM:
+            files.check_input(name, format_of(name, format))
+
+
+def format_of(name: str, format: str | None) -> str | None:
+    """``--input-format`` for the files whose suffix does not tell, None for the others."""
+    from pathlib import Path
+
+    from curvify.formats import READ_FORMATS
+
+    return None if Path(name).suffix.lower().removeprefix(".") in READ_FORMATS else format
+
+
+def short_name(name: str) -> str:
+    """What a file is called where it is shown."""
+    from pathlib import Path
+
+    from curvify.cli import files
+
+    return files.shown_name(Path(name).name, "stdin")
+
+
+def read(name: str, format: str | None, console: Console) -> PolygonMesh:
+    """A mesh with faces; what its file warns of is told."""
+    from curvify.cli import files
+    from curvify.errors import MeshError
+
+    mesh = files.read_input(name, format_of(name, format))
+    shown = files.shown_name(name, "stdin")
+    if not mesh.face_count:
+        raise MeshError(f"{shown}: the mesh has no faces; there is nothing to show")
+    for text in mesh.warnings:
+        console.warn(f"{shown}: {text}")
+    return mesh
+
+
+def vertex_values(mesh: PolygonMesh, kind: str | None) -> Floats | None:
+    """Values of a kind ``(V,)``; of curvatures, those of the normals that a smooth picture is shaded with."""
+    if kind is None:
+        return None
+    from curvify.gpu.shading import shading_normals
+    from curvify.vertex_values import vertex_values
+
+    return vertex_values(mesh, kind, shading_normals(mesh, "smooth" if mesh.corner_normals is None else "auto"))
+
+
+def with_scale(
+    settings: Settings, values: Sequence[Floats | None], kind: str | None, limits: tuple[float, float] | None
+) -> Settings:
+    """The settings with a scale for values of a kind, if there are any. Raises OptionError."""
+    if kind is None:
+        return settings
+    from dataclasses import replace
+
+    from curvify.gpu.scale import Scale, scale_of
+    from curvify.vertex_values import KINDS
+
+    if limits is not None:
+        return replace(settings, scale=Scale(*limits, KINDS[kind]))
+    given = [part for part in values if part is not None]
+    return replace(settings, scale=scale_of(given, KINDS[kind], EXTREME if kind == "curvature" else 0.0))
+
+
+def control_layer(mesh: PolygonMesh) -> Layer:
+    """Edges and vertices of a control mesh; where it lies behind itself they show faintly."""
+    from curvify.gpu.scene import Layer, Stroke
+
+    ink = (0.72, 0.17, 0.10)
+    return Layer(mesh, "hidden", wire=Stroke(ink, 1.8, hidden=0.18), dots=Stroke(ink, 6.0, hidden=0.0))
+
+
+def write(data: bytes, output: str) -> None:
+    """Write a file, completely or not at all, or to standard output."""
+    from curvify.cli import files
+    from curvify.formats import atomic_file
+
+    if output == files.STREAM:
+        stdout = files.CountedStdout()
+        stdout.write(data)
+        stdout.flush()
+        return
+    with atomic_file(output) as out:
+        out.write(data)
