@@ -3,7 +3,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint goldens pictures docs clean
+.PHONY: demo test lint goldens pictures gallery docs clean
+
+.PHONY: demo test lint goldens pictures gallery clean
 
 $(VENV)/demo.stamp: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -33,9 +35,12 @@ test: lint
 goldens: $(VENV)/test.stamp
 	$(BIN)/python -m pytest tests/test_goldens.py --update-goldens
 
-# The pictures of the README; they need OpenGL, which Mesa provides in software.
+# The pictures of the README and of the gallery; they need OpenGL, which Mesa provides in software.
 pictures: $(VENV)/demo.stamp
 	$(BIN)/python docs/pictures/make_pictures.py
+
+gallery: $(VENV)/demo.stamp
+	$(BIN)/python docs/gallery/make_gallery.py
 
 # The pages of the commands, from what the commands say.
 docs: $(VENV)/test.stamp

@@ -36,6 +36,25 @@ def test_every_folder_with_modules_is_a_package() -> None:
             assert (module.parent / "__init__.py").exists(), f"{module.parent} has no __init__.py"
 
 
+def test_files_beside_the_modules_are_packaged() -> None:
+    table = re.search(r"^\[tool.setuptools.package-data\]\n(.*?)\n\n", PROJECT, re.MULTILINE | re.DOTALL)
+    assert table is not None
+    packaged = set()
+    for package, patterns in re.findall(r'^"([\w.]+)" = \[(.*?)\]', table[1], re.MULTILINE | re.DOTALL):
+        folder = next(ROOT / folder for folder, name in FOLDERS.items() if name == package)
+        for pattern in re.findall(r'"(.*?)"', patterns):
+            found = set(folder.glob(pattern))
+            assert found, f"{package}: no file is {pattern}"
+            packaged |= found
+    beside = {
+        path
+        for folder in FOLDERS
+        for path in (ROOT / folder).rglob("*")
+        if path.is_file() and path.suffix not in (".py", ".pyc")
+    }
+    assert beside == packaged
+
+
 def test_the_version_stands_in_two_places_and_is_one() -> None:
     written = re.search(r'^version = "(.*?)"', PROJECT, re.MULTILINE)
     assert written is not None

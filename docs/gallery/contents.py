@@ -46,14 +46,15 @@ PAPERS = (
                 "From polygons to a surface: the pawn's 90 polygons; the curves of its edges, with the edges themselves "
                 "thin in black; the patches between the curves, with their grids; the surface.",
                 construction,
+                {"size": (220, 300)},
             ),
             Figure(
                 "fullness",
                 "13",
-                "The top face of the mushroom with the paper's cross tangents: the quadratic ones swell it more the "
-                "larger alpha is; the linear ones are at the right.",
+                "The top of a cube with the paper's cross tangents: the quadratic ones swell it the more the smaller its "
+                "alpha is; at the right the linear ones, which have none. All other faces have an alpha of 1.",
                 fullness,
-                {"view": (20.0, 12.0)},
+                {"view": (30.0, 10.0), "size": (230, 240)},
             ),
             Figure(
                 "rings",
@@ -68,9 +69,9 @@ PAPERS = (
                 "against-pn",
                 "17",
                 "A body of triangles, quads, pentagons and a hexagon. Averaged normals leave the outline of the "
-                "polygons; PN triangles round it, but their silhouettes and reflections have kinks; Gregory patches have none.",
+                "polygons; PN triangles round it, but reflections break between them; on Gregory patches they run on.",
                 against_pn,
-                {"size": (190, 190)},
+                {"columns": 3, "stripes": 7},
             ),
             Figure(
                 "mushroom",
@@ -83,6 +84,7 @@ PAPERS = (
                 "19",
                 "The pawn as a smooth surface, and with creases on the edges in red.",
                 partial(smooth_and_sharp, "pawn", "pawn-sharp"),
+                {"size": (220, 300)},
             ),
         ),
     ),
@@ -96,6 +98,7 @@ PAPERS = (
                 "A dodecahedron cut into triangles: PN triangles meet in kinks, at which reflections break; those of "
                 "PNG1 triangles run on.",
                 silhouettes,
+                {"stripes": 6},
             ),
             Figure(
                 "png1-cone",
@@ -121,10 +124,9 @@ PAPERS = (
             Figure(
                 "png1-loop",
                 "13",
-                "A ring of triangles whose vertices were moved to their limit under Loop's subdivision: Loop's surface; "
-                "PNG1 with the normals of that limit, nearly the same shape; PNG1 with averaged normals.",
+                "A mushroom of 160 triangles; the limit of its subdivision after Loop; PNG1 from the points and normals of "
+                "that limit, nearly the same shape; PNG1 from the points and averaged normals.",
                 loop_normals,
-                {"view": (30.0, 40.0)},
             ),
         ),
     ),
@@ -149,7 +151,8 @@ PAPERS = (
                 {"columns": 6, "size": (190, 190), "fit": "each"},
             ),
             Figure(
-                "blend-pawn", "14", "The pawn with sharp edges, in red, seen from above and from below.", many_features
+                "blend-pawn", "14", "The pawn with sharp edges, in red, seen from above and from below.", many_features,
+                {"size": (220, 280)},
             ),
         ),
     ),
@@ -163,12 +166,12 @@ PAPERS = (
                 "A vase of ten sides: its polygons; the same with averaged normals, which leave the outline straight; "
                 "subdivided, with a rim that swings up and down; with normals that keep the rim in its plane.",
                 vases,
-                {"view": (20.0, 18.0)},
+                {"view": (20.0, 18.0), "size": (220, 300)},
             ),
             Figure(
                 "overveld-top",
                 "planar polygons",
-                "A cylinder of twelve sides: subdivided with averaged normals, and with its top kept plane.",
+                "A dodecahedron: subdivided with averaged normals, and with one of its upper faces kept plane.",
                 planar_top,
             ),
         ),

@@ -7,30 +7,32 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+
+import curvify
+from curvify.gpu.scene import Layer, Lines, Panel, Stroke
 from meshes import (
     SAMPLES,
-    Floats,
     at_limit,
     by_patches,
     cone,
     creases,
+    cube,
     curled,
     curves_of,
     loop_surface,
     marks_of,
     sample,
+    subdivided,
     tetrahedron,
     triangulated,
 )
-
-import curvify
-from curvify.gpu.scene import Layer, Lines, Panel, Stroke
 
 EDGES = Stroke(width=1.2)
 CURVE = Stroke((0.10, 0.22, 0.45), 1.8)
 SHARP = Stroke((0.85, 0.10, 0.08), 3.0)
 FINE = Stroke(width=0.7)
 LEVEL = 10
+View = tuple[float, float] | None
 
 
 @dataclass(frozen=True)
@@ -44,13 +46,15 @@ class Figure:
     settings: dict[str, Any] = field(default_factory=dict)
 
 
-def coarse(mesh: curvify.PolygonMesh, text: str = "", sharp: object = None, style: str = "flat") -> Panel:
+def coarse(mesh: curvify.PolygonMesh, text: str, sharp: object = None, view: View = None) -> Panel:
     """A coarse mesh with its edges, those that are sharp in red."""
-    lines = [] if sharp is None else [Lines(mesh.positions[np.array(sharp)], SHARP)]
-    return Panel([Layer(mesh, shading=style, wire=EDGES, lines=lines)], text)
+    layers = [Layer(mesh, shading="flat", wire=EDGES)]
+    if sharp is not None:
+        layers.append(Layer(mesh, "hidden", lines=[Lines(mesh.positions[np.array(sharp)], SHARP)]))
+    return Panel(layers, text, view)
 
 
-def surface(mesh: curvify.PolygonMesh, text: str = "", wire: Stroke | None = None, **options: Any) -> Panel:
+def surface(mesh: curvify.PolygonMesh, text: str, wire: Stroke | None = None, **options: Any) -> Panel:
     """The surface of a mesh."""
     return Panel([Layer(curvify.refine(mesh, level=options.pop("level", LEVEL), **options), wire=wire)], text)
 
@@ -72,12 +76,11 @@ def construction() -> list[Panel]:
 
 
 def fullness() -> list[Panel]:
-    """A mushroom whose cap has the paper's alpha."""
-    mesh = sample("mushroom")
-    top = int(np.argmax([mesh.positions[face, 2].mean() for face in mesh.faces()]))
-    panels = []
-    for alpha in (0.5, 1.0, 2.0, 3.0):
-        marks = curvify.Marks(full_faces=np.array([top]), alphas=np.array([alpha]))
+    """A cube whose top has the paper's alpha."""
+    mesh = cube()
+    panels = [coarse(mesh, "polygons")]
+    for alpha in (0.25, 0.5, 1.0, 1.5):
+        marks = curvify.Marks(full_faces=np.array([1]), alphas=np.array([alpha]))
         panels.append(surface(mesh, f"alpha {alpha:g}", cross_tangent="quadratic", marks=marks))
     return [*panels, surface(mesh, "linear", cross_tangent="linear")]
 
@@ -97,22 +100,26 @@ def rings() -> list[Panel]:
 
 
 def against_pn() -> list[Panel]:
-    """Averaged normals, PN triangles and Gregory patches."""
+    """Averaged normals, PN triangles and Gregory patches, lit and mirroring a striped room."""
     mesh = sample("mixed")
     return [
-        coarse(mesh, "triangles to hexagons"),
         Panel([Layer(mesh, shading="smooth")], "averaged normals"),
-        Panel([Layer(mesh, "zebra", shading="smooth")], "their reflections"),
         surface(mesh, "PN triangles", scheme="pn"),
-        zebra(mesh, "their reflections", scheme="pn"),
         surface(mesh, "Gregory patches"),
-        zebra(mesh, "their reflections"),
+        Panel([Layer(mesh, "zebra", shading="smooth")], "reflections"),
+        zebra_of_pn(mesh, "reflections"),
+        zebra(mesh, "reflections"),
     ]
 
 
 def zebra(mesh: curvify.PolygonMesh, text: str, **options: Any) -> Panel:
-    """Reflection lines of a surface, by the normals of its own fine faces, patch by patch."""
-    return Panel([Layer(by_patches(curvify.refine(mesh, level=2 * LEVEL, **options)), "zebra")], text)
+    """Reflection lines of a surface, by its own normals."""
+    return Panel([Layer(curvify.refine(mesh, level=LEVEL, **options), "zebra")], text)
+
+
+def zebra_of_pn(mesh: curvify.PolygonMesh, text: str) -> Panel:
+    """Reflection lines of PN triangles by the normals of their fine faces: those that PN has hide its kinks."""
+    return Panel([Layer(by_patches(curvify.refine(mesh, scheme="pn", level=3 * LEVEL)), "zebra")], text)
 
 
 def smooth_and_sharp(name: str, marks: str) -> list[Panel]:
@@ -135,7 +142,7 @@ def silhouettes() -> list[Panel]:
     return [
         coarse(mesh, "polygons"),
         surface(mesh, "PN", scheme="pn"),
-        zebra(mesh, "its reflections", scheme="pn"),
+        zebra_of_pn(mesh, "its reflections"),
         surface(mesh, "PNG1", scheme="png1"),
         zebra(mesh, "its reflections", scheme="png1"),
     ]
@@ -174,7 +181,7 @@ def curled_knob() -> list[Panel]:
 
 def loop_normals() -> list[Panel]:
     """Loop's surface, and PNG1 from its points with its normals and with averaged ones."""
-    mesh = triangulated(sample("torus"))
+    mesh = subdivided(triangulated(sample("mushroom")))
     limit = at_limit(mesh)
     averaged = limit.with_(corner_normals=None)
     return [
@@ -190,17 +197,11 @@ def loop_normals() -> list[Panel]:
 
 def feature_kinds() -> list[Panel]:
     """A dart, a crease and corners, each beside the mesh."""
-    ball, ring = sample("ball"), sample("ring")
-    cube = curvify.PolygonMesh.from_faces(
-        [[x, y, z] for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)],
-        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]],
-    )
-    top = [[4, 5], [5, 7], [7, 6], [6, 4], [5, 1]]
     panels = []
     for mesh, sharp, text in (
-        (ball, marks_of("ball-darts").crease_edges, "darts"),
-        (ring, marks_of("ring-f-creased").crease_edges, "crease"),
-        (cube, top, "corner"),
+        (cube(), np.array([[4, 5], [5, 7]]), "darts"),
+        (sample("ring"), marks_of("ring-f-creased").crease_edges, "crease"),
+        (cube(), np.array([[5, 4], [5, 7], [5, 1]]), "corner"),
     ):
         panels += [coarse(mesh, "sharp edges", sharp), surface(mesh, text, scheme="blend", marks=creases(sharp))]
     return panels
@@ -230,12 +231,12 @@ def many_features() -> list[Panel]:
     """A pawn with creases, seen from two sides."""
     mesh, sharp = sample("pawn"), marks_of("pawn-sharp").crease_edges
     dense = curvify.refine(mesh, scheme="blend", level=LEVEL, marks=creases(sharp))
-    lines = [Lines(mesh.positions[sharp], SHARP)]
+    above, below = (30.0, 25.0), (30.0, -35.0)
     return [
-        Panel([Layer(mesh, shading="flat", wire=EDGES, lines=lines)], "sharp edges", (30.0, 25.0)),
-        Panel([Layer(mesh, shading="flat", wire=EDGES, lines=lines)], "from below", (30.0, -35.0)),
-        Panel([Layer(dense)], "surface", (30.0, 25.0)),
-        Panel([Layer(dense)], "from below", (30.0, -35.0)),
+        coarse(mesh, "sharp edges", sharp, above),
+        coarse(mesh, "from below", sharp, below),
+        Panel([Layer(dense)], "surface", above),
+        Panel([Layer(dense)], "from below", below),
     ]
 
 
@@ -254,11 +255,11 @@ def vases() -> list[Panel]:
 
 
 def planar_top() -> list[Panel]:
-    """A cylinder whose top is kept plane."""
-    mesh = sample("cylinder")
+    """A dodecahedron, one of whose faces is kept plane."""
+    mesh = sample("dodecahedron")
     top = int(np.argmax([mesh.positions[face, 2].mean() for face in mesh.faces()]))
     return [
         coarse(mesh, "polygons"),
         surface(mesh, "nothing kept", scheme="overveld"),
-        surface(mesh, "top kept plane", scheme="overveld", planar=(top,)),
+        surface(mesh, "a face kept plane", scheme="overveld", planar=(top,)),
     ]

@@ -6,7 +6,6 @@ another one may differ in a last bit here and there.
 
 from __future__ import annotations
 
-import io
 import sys
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from contents import PAPERS, page
 from figures import Figure
 
 from curvify.gpu.device import Device, open_device
-from curvify.gpu.picture import picture
+from curvify.gpu.picture import picture, to_png
 from curvify.gpu.scene import Settings
 
 HERE = Path(__file__).resolve().parent
@@ -22,14 +21,9 @@ PAGE = HERE.parent / "gallery.md"
 
 
 def draw(figure: Figure, device: Device) -> bytes:
-    """The PNG file of a figure, of 256 colors, which is as good for shaded surfaces and a third of the size."""
-    from PIL import Image
-
-    settings = Settings(**{"size": (280, 240), "field_of_view": 20.0, "fit": "auto", **figure.settings})
-    image = Image.fromarray(picture(figure.panels(), settings, device))
-    out = io.BytesIO()
-    image.quantize(256, dither=Image.Dither.NONE).save(out, "PNG", optimize=True)
-    return out.getvalue()
+    """The PNG file of a figure."""
+    settings = Settings(**{"size": (280, 240), "field_of_view": 20.0, **figure.settings})
+    return to_png(picture(figure.panels(), settings, device))
 
 
 def main(names: list[str]) -> None:

@@ -71,6 +71,13 @@ def with_normals(mesh: curvify.PolygonMesh, normals: Floats) -> curvify.PolygonM
     return mesh.with_(corner_normals=unit[mesh.face_vertices])
 
 
+def cube() -> curvify.PolygonMesh:
+    """A cube: vertex ``4 i + 2 j + k`` has the coordinates ``k, j, i``, -1 for 0; face 1 is the top."""
+    points = [[x, y, z] for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)]
+    faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    return curvify.PolygonMesh.from_faces(points, faces)
+
+
 def cone(sides: int = 6) -> curvify.PolygonMesh:
     """A cone of triangles that is open below, with the normals of symmetry."""
     angles = 2 * np.pi * np.arange(sides) / sides

@@ -1,0 +1,51 @@
+"""Pages in a headless browser. No test lives here."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
+#: Set to anything, it makes tests fail rather than skip where there is no browser.
+NEEDED = "CURVIFY_TEST_BROWSER"
+SETTINGS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--hide-scrollbars",
+    "--force-device-scale-factor=1",
+    "--virtual-time-budget=10000",
+)
+
+
+def browser_or_skip() -> str:
+    """The name of a browser; the test is skipped where there is none, unless the environment forbids that."""
+    found = next(filter(None, map(shutil.which, PROGRAMS)), None)
+    if found is None and os.environ.get(NEEDED):
+        raise AssertionError(f"no browser: none of {', '.join(PROGRAMS)} is installed")
+    if found is None:
+        pytest.skip(f"no browser: install chromium to test pages ({', '.join(PROGRAMS)} were looked for)")
+    return found
+
+
+def screenshot(page: Path, picture: Path, size: tuple[int, int]) -> None:
+    """Take a picture of a page."""
+    profile = picture.with_suffix(".profile")
+    line = [browser_or_skip(), *SETTINGS, f"--user-data-dir={profile}", f"--window-size={size[0]},{size[1]}"]
+    done = subprocess.run(
+        [*line, f"--screenshot={picture}", page.as_uri()], capture_output=True, text=True, timeout=120, check=False
+    )
+    shutil.rmtree(profile, ignore_errors=True)
+    assert picture.exists(), done.stderr[-2000:]

@@ -1,0 +1,199 @@
+"""`curvify view`: the command line, and its page in a browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from chromium import browser_or_skip, screenshot
+from curvify.cli.main import run
+from curvify.formats import write_mesh
+from surfaces import on_sphere, truncated_icosahedron
+
+WIDE, HIGH = 300, 260
+#: What the frames of the picture start with; `keys` are pressed after that.
+FRAMES = {
+    "plain": "control=0",
+    "zebra": "style=zebra&control=0",
+    "normals": "style=normals&control=0",
+    "wire": "wire=1&control=0",
+    "control": "",
+    "flat": "flat=1&control=0",
+    "turned": "control=0&view=40,30",
+    "pressed": "",
+    "second": "model=2&control=0",
+    "closer": "control=0&zoom=1.5",
+    "values": "style=values&control=0",
+    "parallel": "control=0&parallel=1",
+}
+#: Two arrows to the right, one up, and no control mesh: as in the frame "turned".
+KEYS = ["ArrowRight", "ArrowRight", "ArrowUp", "c"]
+PRESS = """<script type="module">
+const wait = setInterval(() => {
+  if (!document.getElementById("facts").textContent) return;
+  clearInterval(wait);
+  for (const key of KEYS) dispatchEvent(new KeyboardEvent("keydown", { key }));
+}, 20);
+</script></body>"""
+
+
+@pytest.fixture(scope="module")
+def frames(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
+    """Pictures ``(h,w,3)`` of one page in several states, by the names of ``FRAMES``: one run of the browser."""
+    browser_or_skip()
+    folder = tmp_path_factory.mktemp("pages")
+    coarse = on_sphere(truncated_icosahedron())
+    write_mesh(coarse, folder / "coarse.obj")
+    write_mesh(coarse.with_(positions=coarse.positions * [1.0, 1.0, 0.7]), folder / "low.obj")
+    names = [str(folder / name) for name in ("coarse.obj", "ball.ply", "low.obj", "page.html")]
+    assert run(["refine", names[0], names[1], "--level", "4"]) == 0
+    options = ["--control", names[0], "--values", "z", "--view", "30,25"]
+    assert run(["view", names[1], names[2], names[3], *options]) == 0
+    page = Path(names[3]).read_text().replace('"style": "values"', '"style": "shaded"')
+    (folder / "page.html").write_text(page)
+    (folder / "pressed.html").write_text(page.replace("</body>", PRESS.replace("KEYS", str(KEYS))))
+    sources = [f"{'pressed' if name == 'pressed' else 'page'}.html#{state}" for name, state in FRAMES.items()]
+    shown = "".join(f'<iframe src="{source}"></iframe>' for source in sources)
+    look = f"body{{margin:0;font-size:0}}iframe{{border:0;width:{WIDE}px;height:{HIGH}px}}"
+    (folder / "all.html").write_text(f"<!DOCTYPE html><style>{look}</style><body>{shown}</body>")
+    rows = -(-len(FRAMES) // 4)
+    screenshot(folder / "all.html", folder / "all.png", (4 * WIDE, rows * HIGH))
+    image = np.asarray(Image.open(folder / "all.png").convert("RGB")).astype(int)
+    places = {name: divmod(k, 4) for k, name in enumerate(FRAMES)}
+    return {
+        name: image[row * HIGH : (row + 1) * HIGH, column * WIDE : (column + 1) * WIDE]
+        for name, (row, column) in places.items()
+    }
+
+
+def middle(frame: np.ndarray) -> np.ndarray:
+    """The part of a frame without buttons and words."""
+    return frame[90:215, 60:240]
+
+
+def covered(frame: np.ndarray) -> float:
+    """Share of the middle that is not background."""
+    return float((middle(frame) < 250).any(axis=2).mean())
+
+
+def test_a_ball_is_round_and_lit_from_the_upper_left(frames):
+    shown = middle(frames["plain"])
+    assert 0.5 < covered(frames["plain"]) < 0.98
+    bright = shown.sum(axis=2)
+    assert bright[40, 60] > bright[115, 90] + 60
+
+
+def test_zebra_is_black_and_white(frames):
+    shown = middle(frames["zebra"]).max(axis=2)
+    inside = (middle(frames["plain"]) < 250).any(axis=2)
+    dark, light = (shown[inside] < 80).mean(), (shown[inside] > 150).mean()
+    assert dark > 0.25 and light > 0.25 and dark + light > 0.85
+
+
+def test_normals_are_colors(frames):
+    assert (np.ptp(middle(frames["normals"]), axis=2) > 60).mean() > 0.3
+    assert (np.ptp(middle(frames["plain"]), axis=2) > 90).mean() < 0.1
+
+
+def test_wire_and_facets(frames):
+    lines = middle(frames["plain"]).sum(axis=2) - middle(frames["wire"]).sum(axis=2)
+    assert 0.03 < (lines > 100).mean() < 0.7
+    assert (middle(frames["plain"]) != middle(frames["flat"])).any(axis=2).mean() > 0.05
+
+
+def test_the_coarse_mesh_goes_on_and_off(frames):
+    def red(frame: np.ndarray) -> float:
+        shown = middle(frame)
+        return float(((shown[..., 0] > 140) & (shown[..., 1:] < 90).all(axis=2)).mean())
+
+    assert red(frames["control"]) > 0.01
+    assert red(frames["plain"]) == 0
+
+
+def test_values_have_their_colors_and_a_scale(frames):
+    shown = middle(frames["values"])
+    assert shown[5:25].mean() > shown[-25:-5].mean() + 20  # z is dark below and light above
+    last = np.array([253, 243, 168])
+
+    def ends_of_ramps(frame: np.ndarray) -> int:
+        return int((np.abs(frame[180:] - last).max(axis=2) < 12).sum())
+
+    assert ends_of_ramps(frames["values"]) > 10
+    assert ends_of_ramps(frames["plain"]) == 0
+
+
+def test_keys_do_what_the_address_does(frames):
+    assert (middle(frames["turned"]) != middle(frames["plain"])).any()
+    assert np.array_equal(middle(frames["pressed"]), middle(frames["turned"]))
+
+
+def test_other_meshes_and_other_cameras(frames):
+    assert (middle(frames["second"]) != middle(frames["plain"])).any(axis=2).mean() > 0.1
+    assert covered(frames["closer"]) > 1.05 * covered(frames["plain"])
+    assert (middle(frames["parallel"]) != middle(frames["plain"])).any()
+
+
+def test_to_a_file_and_through_a_pipe(process, folder):
+    result = process("view", "cube.obj", "page.html", "-v")
+    assert (result.code, result.out) == (0, b"")
+    page = Path("page.html").read_bytes()
+    assert f"page.html: {len(page):,} bytes" in result.err
+    piped = process("view", "-", "-", "--input-format", "obj", stdin=Path("cube.obj"))
+    assert (piped.code, piped.err) == (0, "")
+    assert piped.out == page.replace(b"cube.obj", b"stdin")
+
+
+def test_every_option_changes_the_page(call, folder):
+    def written(*options: str) -> bytes:
+        assert call("view", "cube.obj", "page.html", *options).code == 0
+        return Path("page.html").read_bytes()
+
+    pages = [
+        written(*options)
+        for options in (
+            (),
+            ("--style", "zebra"),
+            ("--shading", "smooth"),
+            ("--values", "z"),
+            ("--values", "z", "--limits", "0,5"),
+            ("--values", "bend"),
+            ("--wire",),
+            ("--control", "dart.obj"),
+            ("--stripes", "3"),
+            ("--color", "gold"),
+            ("--view", "top"),
+            ("--up", "y"),
+            ("--background", "#123"),
+        )
+    ]
+    assert len(set(pages)) == len(pages)
+    assert written() == pages[0]
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        ("cube.obj page.png", "page.png: pages are HTML files; give the last name the suffix .html"),
+        ("cube.obj nowhere/a.html", "its folder does not exist"),
+        ("cube.obj taken.html --no-clobber", "taken.html: it exists already"),
+        ("none.obj a.html", "none.obj: cannot read"),
+        ("points.obj a.html", "points.obj: the mesh has no faces"),
+        ("cube.obj a.html --control none.obj", "none.obj: cannot read"),
+        ("cube.obj a.html --limits 0,1", "--limits are those of --values"),
+        ("cube.obj a.html --values z --limits 1,0", "is not a range"),
+        ("cube.obj a.html --values z --style zebra", "both color the surface"),
+        ("cube.obj a.html --background plaid", "unknown color 'plaid'"),
+    ],
+)
+def test_what_is_refused(call, folder, line, text):
+    Path("taken.html").write_text("mine")
+    Path("points.obj").write_text("v 0 0 0\nv 1 0 0\n")
+    result = call("view", *line.split())
+    assert result.code == 2
+    assert result.err.startswith("curvify: error: ") and result.err.count("\n") == 1
+    assert text in result.err
+    assert Path("taken.html").read_text() == "mine"
+    assert not Path("a.html").exists()
