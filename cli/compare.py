@@ -10,7 +10,7 @@ from curvify.cli import options
 from curvify.cli.group import COMMANDS, Command
 
 if TYPE_CHECKING:
-    from curvify.mesh import PolygonMesh
+    from curvify.mesh import Floats, PolygonMesh
 
 EXAMPLES = (
     (
@@ -23,8 +23,8 @@ EXAMPLES = (
     ),
     ("Where do they differ?", "curvify compare golden.ply coarse.obj --surface --heatmap heat.ply"),
 )
-#: Formats that hold vertex colors.
-HEAT_FORMATS = ("ply", "obj", "off", "glb")
+#: Formats that hold vertex colors, and a picture.
+HEAT_FORMATS = ("png", "ply", "obj", "off", "glb")
 
 
 class Length(click.ParamType):  # type: ignore[type-arg,unused-ignore]
@@ -85,7 +85,8 @@ class Length(click.ParamType):  # type: ignore[type-arg,unused-ignore]
         "Output",
         "--heatmap",
         metavar="FILE",
-        help="Write B with vertex colors that show how far it is from A: from dark, not at all, to light, the most.",
+        help="Write B with vertex colors that show how far it is from A: from dark, not at all, to light, the most; "
+        "with the suffix .png, a picture of it.",
     ),
     options.as_json,
     options.quiet,
@@ -190,8 +191,25 @@ def write_heatmap(path: str, a: PolygonMesh, b: PolygonMesh, surface: bool) -> d
 
     values = deviations(b, a, surface)
     most = float(values.max())
-    write_mesh(heat_map(b, values, most), path)
+    if path.lower().endswith(".png"):
+        draw_heatmap(path, b, values, most)
+    else:
+        write_mesh(heat_map(b, values, most), path)
     return {"file": path, "most": most}
+
+
+def draw_heatmap(path: str, mesh: PolygonMesh, values: Floats, most: float) -> None:
+    """Write a picture of the mesh from two opposite sides, colored by its distances ``(V,)``, with their scale."""
+    from curvify.cli import pictures
+    from curvify.gpu.picture import picture, to_png
+    from curvify.gpu.scale import Scale
+    from curvify.gpu.scene import Layer, Panel, Settings
+
+    azimuth, elevation = Settings().view
+    views = (azimuth, elevation), (azimuth + 180, -elevation)
+    panels = [Panel([Layer(mesh, "values", values=values)], view=view) for view in views]
+    settings = Settings(size=(600, 500), scale=Scale(0.0, most, "distance, units of the file"))
+    pictures.write(to_png(picture(panels, settings)), path)
 
 
 def _lines(name: str, answer: dict[str, Any]) -> list[str]:

@@ -15,7 +15,10 @@ EXAMPLES = (
         "curvify refine coarse.obj dense.ply && curvify view dense.ply page.html --control coarse.obj",
     ),
     ("Reflection lines first", "curvify view coarse.obj page.html --style zebra --shading smooth"),
-    ("Several meshes to flick through", "curvify view coarse.obj golden.ply page.html --wire"),
+    (
+        "Several meshes to flick through, their height as colors",
+        "curvify refine coarse.obj dense.ply && curvify view coarse.obj dense.ply page.html --values z",
+    ),
 )
 
 

@@ -104,11 +104,11 @@ class Device:
             "limits": self.limits,
         }
 
-    def check(self) -> None:
-        """Raise DeviceError if OpenGL has met an error since the last check."""
+    def check(self, advice: str = "try --backend cpu") -> None:
+        """Raise DeviceError, with what to do about it, if OpenGL has met an error since the last check."""
         error = self.ctx.error
         if error != "GL_NO_ERROR":
-            raise DeviceError(f"OpenGL on {self.renderer} failed with {error}; a smaller task or another device may do")
+            raise DeviceError(f"OpenGL on {self.renderer} failed with {error}; {advice}")
 
     def __post_init__(self) -> None:
         self._open = True

@@ -121,7 +121,7 @@ class Painter:
                 part = to_bytes(self._read(wide, high), self.settings.background)
                 top = height - (y + high) // FINER
                 image[top : top + high // FINER, x // FINER : (x + wide) // FINER] = part
-        self.device.check()
+        self.device.check("choose a smaller --size or a coarser mesh")
         return image
 
     def _begin(self, x: int, y: int, wide: int, high: int, camera: Camera) -> None:

@@ -43,25 +43,25 @@ PAPERS = (
             Figure(
                 "construction",
                 "1",
-                "From polygons to a surface: the pawn's 90 polygons; the curves of its edges, with the edges themselves "
-                "thin in black; the patches between the curves, with their grids; the surface.",
+                "From polygons to a surface: the pawn's 90 polygons; the curves of its edges, with the edges "
+                "themselves thin in black; the patches between the curves, with their grids; the surface.",
                 construction,
                 {"size": (220, 300)},
             ),
             Figure(
                 "fullness",
                 "13",
-                "The top of a cube with the paper's cross tangents: the quadratic ones swell it the more the smaller its "
-                "alpha is; at the right the linear ones, which have none. All other faces have an alpha of 1.",
+                "The top of a cube with the paper's cross tangents: the quadratic ones swell it the more the smaller "
+                "its alpha is; at the right the linear ones, which have none. All other faces have an alpha of 1.",
                 fullness,
                 {"view": (30.0, 10.0), "size": (230, 240)},
             ),
             Figure(
                 "rings",
                 "15",
-                "One ring of 48 quads in six shapes: (a) smooth everywhere; (b) with a flat top and bottom; (c) with edge "
-                "normals that keep the edges around the axis level; (d) made of cones; (e) flat above and below, with a "
-                "crease around the outside; (f) with that crease alone.",
+                "One ring of 48 quads in six shapes: (a) smooth everywhere; (b) with a flat top and bottom; (c) with "
+                "edge normals that keep the edges around the axis level; (d) made of cones; (e) flat above and below, "
+                "with a crease around the outside; (f) with that crease alone.",
                 rings,
                 {"columns": 3},
             ),
@@ -124,8 +124,8 @@ PAPERS = (
             Figure(
                 "png1-loop",
                 "13",
-                "A mushroom of 160 triangles; the limit of its subdivision after Loop; PNG1 from the points and normals of "
-                "that limit, nearly the same shape; PNG1 from the points and averaged normals.",
+                "A mushroom of 160 triangles; the limit of its subdivision after Loop; PNG1 from the points and "
+                "normals of that limit, nearly the same shape; PNG1 from the points and averaged normals.",
                 loop_normals,
             ),
         ),
@@ -184,8 +184,9 @@ def page() -> str:
     parts = [
         "<!-- Made by docs/gallery/make_gallery.py: run `make gallery` after a change. -->",
         "# Gallery",
-        "Figures of the papers that curvify is built on, drawn anew from [our own sample meshes](../sample_meshes/README.md)\n"
-        "and some that [the gallery](gallery/meshes.py) makes itself. `make gallery` draws all of them.",
+        "Figures of the papers that curvify is built on, drawn anew from our own\n"
+        "[sample meshes](../sample_meshes/README.md) and some that [the gallery](gallery/meshes.py) makes itself.\n"
+        "`make gallery` draws all of them.",
     ]
     for paper in PAPERS:
         parts += [f"## {paper.title}", f"`--scheme {paper.scheme}`"]

@@ -41,7 +41,7 @@ function cameraMatrices(camera, width, height) {
 
 // Where the eye stands: at zoom 1 it sees a ball around the mesh.
 function eyeDistance(camera) {
-  return (1.05 * camera.radius) / Math.sin(camera.angle / 2) / camera.zoom;
+  return (1.12 * camera.radius) / Math.sin(camera.angle / 2) / camera.zoom;
 }
 
 // Pixels that a unit length at the center covers.

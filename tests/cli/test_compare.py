@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import curvify
+from opengl import device_or_skip
 
 
 @pytest.fixture
@@ -74,9 +76,19 @@ def test_a_heat_map(call, pair):
     heat = curvify.read("heat.ply")
     assert heat.faces() == curvify.read("fine.ply").faces()
     assert len(np.unique(heat.vertex_colors, axis=0)) > 10
-    for name in ("heat.png", "nowhere/heat.ply"):
+    for name in ("heat.jpg", "nowhere/heat.ply", "nowhere/heat.png"):
         result = call("compare", "a.ply", "b.ply", "--heatmap", name)
         assert (result.code, result.out) == (2, b"")
+
+
+def test_a_heat_map_as_a_picture(call, pair):
+    device_or_skip().close()
+    assert call("compare", "a.ply", "a.ply", "--heatmap", "same.png").code == 0
+    result = call("compare", "a.ply", "b.ply", "--heatmap", "heat.png")
+    assert (result.code, result.err) == (1, "")
+    same, heat = (np.asarray(Image.open(name)).astype(int) for name in ("same.png", "heat.png"))
+    assert heat.shape == same.shape and heat.shape[1] == 1200
+    assert len(np.unique(heat[:500].reshape(-1, 3), axis=0)) > 2 * len(np.unique(same[:500].reshape(-1, 3), axis=0))
 
 
 def test_standard_input(process, call, pair):
