@@ -88,7 +88,11 @@ void main() {
         return;
     }
     vec3 base = gl_FrontFacing ? front_color : back_color;
-    if (style == VALUES) base = value_color(value);
+    if (style == VALUES) {
+        // Light from the eye alone, and little shade: a color has to be found again in the scale.
+        color = vec4(value_color(value) * (0.7 + 0.3 * max(dot(n, towards_eye), 0.0)), 1.0);
+        return;
+    }
     if (style == ZEBRA) base = mix(vec3(0.80), vec3(0.012), dark_band(n, towards_eye));
     color = vec4(lit(base, n, towards_eye), 1.0);
 }
