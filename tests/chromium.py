@@ -40,12 +40,17 @@ def browser_or_skip() -> str:
     return found
 
 
-def screenshot(page: Path, picture: Path, size: tuple[int, int]) -> None:
-    """Take a picture of a page."""
-    profile = picture.with_suffix(".profile")
+def screenshot(page: Path, picture: Path, size: tuple[int, int], tries: int = 3) -> None:
+    """Take a picture of a page. A browser that hangs, as it does now and then on a loaded machine, is asked again."""
+    profile = picture.with_suffix(f".profile{tries}")
     line = [browser_or_skip(), *SETTINGS, f"--user-data-dir={profile}", f"--window-size={size[0]},{size[1]}"]
-    done = subprocess.run(
-        [*line, f"--screenshot={picture}", page.as_uri()], capture_output=True, text=True, timeout=120, check=False
-    )
+    try:
+        done = subprocess.run(
+            [*line, f"--screenshot={picture}", page.as_uri()], capture_output=True, text=True, timeout=30, check=False
+        )
+    except subprocess.TimeoutExpired:
+        if tries == 1:
+            raise
+        return screenshot(page, picture, size, tries - 1)
     shutil.rmtree(profile, ignore_errors=True)
     assert picture.exists(), done.stderr[-2000:]
