@@ -51,6 +51,7 @@ def screenshot(page: Path, picture: Path, size: tuple[int, int], tries: int = 3)
     except subprocess.TimeoutExpired:
         if tries == 1:
             raise
-        return screenshot(page, picture, size, tries - 1)
+        screenshot(page, picture, size, tries - 1)
+        return
     shutil.rmtree(profile, ignore_errors=True)
     assert picture.exists(), done.stderr[-2000:]
