@@ -55,17 +55,18 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     Raises FormatError where the target cannot be written or there is no room.
     """
     name = os.fspath(path)
-    temporary = target = None
+    temporary = target = held = None
     try:
-        opened = _open_stream(name)
-        if opened is None:
-            opened, temporary, target = _open_beside(name)
-    except ValueError:
-        raise FormatError(f"{name!r}: cannot write: that is not a file name") from None
-    except OSError as error:
-        raise _explain(name, "write", error) from None
-    held = None
-    try:
+        try:
+            opened = _open_stream(name)
+            if opened is None:
+                target = _target(name)
+                temporary = _beside(target)  # known before there is a file: a signal may come at any time
+                opened = _create(temporary, target)
+        except ValueError:
+            raise FormatError(f"{name!r}: cannot write: that is not a file name") from None
+        except OSError as error:
+            raise _explain(name, "write", error) from None
         with opened:
             if temporary and os.name == "posix":
                 held = os.dup(opened.fileno())  # keeps the lock until the file has its name
@@ -104,20 +105,30 @@ def _open_stream(name: str) -> BinaryIO | None:
     return open(name, "wb")
 
 
-def _open_beside(name: str) -> tuple[BinaryIO, str, str]:
-    """A new temporary file in the folder of the target: file, its path, the target's path."""
+def _target(name: str) -> str:
+    """The file that a name leads to."""
     if not name or name.endswith("/"):
         raise IsADirectoryError(errno.EISDIR, "is a directory", name)
-    target = os.path.realpath(name)
+    return os.path.realpath(name)
+
+
+def _beside(target: str) -> str:
+    """A name for a temporary file in the folder of the target that nobody else uses."""
+    return os.path.join(os.path.dirname(target), f".curvify-{os.urandom(6).hex()}.part")
+
+
+def _create(temporary: str, target: str) -> BinaryIO:
+    """A new temporary file, locked, with the permissions of the target where there is one."""
     while True:
-        temporary = os.path.join(os.path.dirname(target), f".curvify-{os.urandom(6).hex()}.part")
         descriptor = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
         if _lock(descriptor) and os.path.exists(temporary):
             break
-        os.close(descriptor)  # someone who cleans up was faster
+        os.close(descriptor)  # someone who cleans up was faster and removed it
+        with suppress(OSError):
+            os.unlink(temporary)
     with suppress(OSError):
         os.chmod(temporary, stat.S_IMODE(os.stat(target).st_mode))
-    return os.fdopen(descriptor, "w+b"), temporary, target
+    return os.fdopen(descriptor, "w+b")
 
 
 def _lock(descriptor: int) -> bool:
