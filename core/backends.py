@@ -13,7 +13,7 @@ from curvify import evaluate
 from curvify.errors import DeviceError, OptionError
 from curvify.mesh import Floats, Ints
 from curvify.sampling import Sampling
-from curvify.schemes.base import PatchClass, Patches
+from curvify.schemes.base import Edges, PatchClass, Patches
 
 if TYPE_CHECKING:
     from curvify.gpu.evaluate import GpuBackend
@@ -28,10 +28,8 @@ class Backend(Protocol):
 
     name: str
 
-    def edges(self, curves: Floats, fields: Floats, t: Floats) -> tuple[Floats, Floats]:
-        """Positions and unit normals ``(3,e,m)`` at ``t (m,)`` on edges with Bezier points ``curves (3,e,d+1)`` and
-        normal fields ``(3,e,q+1)``.
-        """
+    def edges(self, edges: Edges, ids: Ints, fields: Ints, t: Floats) -> tuple[Floats, Floats]:
+        """Positions and unit normals ``(3,e,m)`` at ``t (m,)`` on edges ``ids (e,)`` with normal fields ``(e,)``."""
 
     def fill_patches(
         self,
@@ -61,9 +59,9 @@ class CpuBackend:
     bytes_sent = 0
     fill_patches = staticmethod(evaluate.fill_patches)
 
-    def edges(self, curves: Floats, fields: Floats, t: Floats) -> tuple[Floats, Floats]:
+    def edges(self, edges: Edges, ids: Ints, fields: Ints, t: Floats) -> tuple[Floats, Floats]:
         """Positions and unit normals of edges."""
-        return evaluate.edge_points(curves, t), evaluate.edge_normals(fields, t)
+        return edges.points(ids, t), edges.normals(fields, t)
 
     def describe(self) -> dict[str, Any]:
         """Nothing but its name."""

@@ -70,6 +70,12 @@ class Split:
         return {name: int(faces[0]) for name, faces in hits.items() if len(faces)}
 
 
+def whole_faces(face_offsets: Ints, face_vertices: Ints) -> Split:
+    """Every face as one piece."""
+    reasons = np.zeros(len(face_offsets) - 1, dtype=np.uint8)
+    return cut_along(face_offsets, face_vertices, np.zeros((0, 2), dtype=np.int64), reasons)
+
+
 def split_polygons(
     positions: Floats, face_offsets: Ints, face_vertices: Ints, *, rule: str = "best", max_sides: int = 64
 ) -> Split:

@@ -16,11 +16,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from curvify import tables
-from curvify.arrays import as_slice, unit_rows
+from curvify.arrays import as_slice, cross, unit_rows, values_of
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import unit
-from curvify.sampling import Sampling
-from curvify.schemes.base import Basis, Controls, Form, LinearControls, PatchClass, Patches, bernstein_basis
+from curvify.sampling import Sampling, kite_coordinates
+from curvify.schemes.base import Basis, Controls, Form, KiteForms, LinearControls, PatchClass, Patches
 from curvify.schemes.domain import domain_jets
 from curvify.tables import TAIL, Tables, chebyshev_points
 
@@ -90,7 +90,7 @@ def fill_patches(
         return
     grid, exact = (patch_class.sides, level), patch_class.normals is None
     orders = 3 if exact else 1
-    for place, values in _evaluate_form(patch_class.surface, rows, sampling.points, grid, tolerance, orders):
+    for place, values in _evaluate_surface(patch_class.surface, rows, sampling, level, tolerance, orders):
         _store(positions, place, values[0])
         if exact:
             normal, parallel = _cross_normals(values[1], values[2])
@@ -135,6 +135,37 @@ def _cross_normals(a: Floats, b: Floats) -> tuple[Floats, tuple[Ints, Ints] | No
     np.sqrt(square, out=square)
     normal /= square
     return normal, parallel
+
+
+def _evaluate_surface(
+    surface: Form | KiteForms, rows: Ints, sampling: Sampling, level: int, tolerance: float, orders: int
+) -> Iterator[tuple[tuple[Ints, slice], Floats]]:
+    """Values ``(o,3,f,S)`` of a surface at all samples, with the index of the patches and samples they belong to."""
+    if isinstance(surface, Form):
+        yield from _evaluate_form(surface, rows, sampling.points, (sampling.sides, level), tolerance, orders)
+        return
+    for part, form, corners, first, points, grid in kite_blocks(surface, rows, sampling, level):
+        for (done, samples), values in _evaluate_form(form, corners, points, grid, tolerance, orders):
+            yield (part[done], slice(first + samples.start, first + samples.stop)), values
+
+
+def kite_blocks(
+    surface: KiteForms, rows: Ints, sampling: Sampling, level: int
+) -> Iterator[tuple[Ints, Form, Ints, int, Floats, tuple[int, int]]]:
+    """The samples of a surface of kites by form: which of the patches ``rows (f,)`` have a form at a kite, the form,
+    the corners it is for; the first of the patches' samples that lie there, their places in the kite ``(m,2)``, and the
+    name of these for tables.
+    """
+    size = len(sampling.kite)
+    for corner in range(sampling.sides):
+        which = surface.which[rows, corner]
+        blocks = [(corner * size, sampling.kite, (0, level))]
+        if corner == 0:  # the middle of the patch, which all its kites share
+            blocks.append((sampling.sides * size, np.ones((1, 2)), (0, 0)))
+        for form in values_of(which):
+            part = np.flatnonzero(which == form)
+            for first, points, grid in blocks:
+                yield part, surface.forms[form], surface.corners[rows[part]] + corner, first, points, grid
 
 
 def _evaluate_form(
@@ -231,23 +262,56 @@ def evaluate_at(patches: Patches, ids: Ints, points: Floats) -> tuple[Floats, Fl
     result = np.empty((3, len(ids), 3))
     for patch_class in patches.classes:
         mine = np.flatnonzero(_rows_of(patch_class, ids) >= 0)
-        for begin in range(0, len(mine), tables.SAMPLES):
-            part = mine[begin : begin + tables.SAMPLES]
-            rows = _rows_of(patch_class, ids[part])
-            basis = patch_class.surface.basis(points[part])
-            controls = patch_class.surface.controls(rows)
-            total = np.einsum("cql,oql->oqc", controls.linear, basis.linear)
-            if basis.weights.shape[2]:
-                t = np.empty((*basis.abscissae.shape[1:], 3))
-                t[..., 0], t[..., 1], t[..., 2] = basis.abscissae[0], 0.0, 1.0
-                values, slopes = controls.field_derivatives(t)
-                total += np.einsum("cqk,oqk->oqc", values[..., 0], basis.weights)
-                total += np.einsum("cqke,oqke->oqc", values[..., 1:], basis.ends)
-                for order in (1, 2):
-                    chain = basis.weights[0] * basis.abscissae[order]
-                    total[order] += np.einsum("cqk,qk->qc", slopes[..., 0], chain)
-            result[:, part] = total
+        surface = patch_class.surface
+        if isinstance(surface, Form):
+            result[:, mine] = _form_at(surface, _rows_of(patch_class, ids[mine]), points[mine])
+        else:
+            result[:, mine] = _kites_at(surface, patch_class.sides, _rows_of(patch_class, ids[mine]), points[mine])
     return result[0], result[1], result[2]
+
+
+def _kites_at(surface: KiteForms, sides: int, rows: Ints, points: Floats) -> Floats:
+    """Jets ``(3,m,3)`` of a surface of kites at a point of each of the patches ``rows (m,)`` of its class."""
+    kite, inside, slopes = kite_coordinates(sides, points)
+    which = surface.which[rows, kite]
+    result = np.empty((3, len(rows), 3))
+    for form in values_of(which):
+        part = np.flatnonzero(which == form)
+        jets = _form_at(surface.forms[form], surface.corners[rows[part]] + kite[part], inside[part])
+        result[0, part] = jets[0]
+        result[1:, part] = np.einsum("oqc,qox->xqc", jets[1:], slopes[part])
+    return result
+
+
+def _form_at(form: Form, rows: Ints, points: Floats) -> Floats:
+    """Jets ``(3,m,3)`` of a form at a point of each of ``rows (m,)``."""
+    result = np.empty((3, len(rows), 3))
+    for begin in range(0, len(rows), tables.SAMPLES):
+        part = slice(begin, begin + tables.SAMPLES)
+        basis, controls = form.basis(points[part]), form.controls(rows[part])
+        total = np.einsum("cql,oql->oqc", controls.linear, basis.linear)
+        if basis.weights.shape[2]:
+            t = np.empty((*basis.abscissae.shape[1:], 3))
+            t[..., 0], t[..., 1], t[..., 2] = basis.abscissae[0], 0.0, 1.0
+            values, slopes = controls.field_derivatives(t)
+            total += np.einsum("cqk,oqk->oqc", values[..., 0], basis.weights)
+            total += np.einsum("cqke,oqke->oqc", values[..., 1:], basis.ends)
+            for order in (1, 2):
+                chain = basis.weights[0] * basis.abscissae[order]
+                total[order] += np.einsum("cqk,qk->qc", slopes[..., 0], chain)
+        result[:, part] = total
+    return result
+
+
+def surface_at(patches: Patches, ids: Ints, points: Floats) -> tuple[Floats, Floats]:
+    """Positions and unit normals ``(m,3)`` of patches ``ids (m,)`` at domain points ``(m,2)`` of their own."""
+    position, by_xi, by_eta = evaluate_at(patches, ids, points)
+    normal = cross(by_xi, by_eta)
+    square = (normal**2).sum(axis=1)
+    parallel = square <= PARALLEL * (by_xi**2).sum(axis=1) * (by_eta**2).sum(axis=1)
+    normal /= np.sqrt(np.where(parallel, 1.0, square))[:, None]
+    normal[parallel] = blended_normals(patches, ids[parallel], points[parallel])
+    return position, normal
 
 
 def blended_normals(patches: Patches, ids: Ints, points: Floats) -> Floats:
@@ -262,28 +326,3 @@ def blended_normals(patches: Patches, ids: Ints, points: Floats) -> Floats:
             opposite = np.linalg.norm(blend, axis=1, keepdims=True) < 1e-9
             result[mine] = unit(np.where(opposite, patches.normals[corners[:, 0]], blend))
     return result
-
-
-# --- edges --------------------------------------------------------------------------------------------------
-
-
-def edge_points(curves: Floats, t: Floats) -> Floats:
-    """Points ``(3,e,m)`` of Bezier curves ``(3,e,d+1)`` at ``t (m,)``, in plain elementwise arithmetic: an edge gets
-    the same bits wherever it stands. In memory the edges come last.
-    """
-    rows = np.ascontiguousarray(curves.transpose(2, 0, 1))
-    basis = bernstein_basis(len(rows) - 1, t)[:, :, None, None]
-    total = rows[0] * basis[0]
-    term = np.empty_like(total)
-    for i in range(1, len(rows)):
-        total += np.multiply(rows[i], basis[i], out=term)
-    return total.transpose(1, 2, 0)
-
-
-def edge_normals(fields: Floats, t: Floats) -> Floats:
-    """Unit normals ``(3,e,m)`` of Bezier normal fields ``(3,e,q+1)`` at ``t (m,)``."""
-    normals = edge_points(fields, t)
-    length = np.sqrt(np.einsum("cem,cem->em", normals, normals))
-    length[length == 0] = 1.0
-    normals /= length
-    return normals

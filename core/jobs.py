@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from curvify.arrays import as_slice
 from curvify.backends import Backend
 from curvify.errors import OptionError
 from curvify.mesh import Floats, Ints, PolygonMesh
@@ -154,9 +153,7 @@ class _Evaluation:
         t = numbering.abscissae
         records = self._records(len(edges) * len(t)).reshape(len(edges), len(t))
         turn = numbering.reversed[edges][:, None]
-        positions, normals = self.backend.edges(
-            patches.curves[:, as_slice(edges)], patches.fields[:, as_slice(fields)], t
-        )
+        positions, normals = self.backend.edges(patches.edges, edges, fields, t)
         for name, values in (("position", positions), ("normal", normals)):
             along = np.where(turn, values[..., ::-1], values)
             for i in range(3):

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from curvify.mesh import Floats, Ints
-from curvify.records import record
+from curvify.records import field, record
 
 
 @record
@@ -24,7 +24,9 @@ class Sampling:
     ``points (S,2)`` interior points of the domain; ``blend (S,n)`` what each corner contributes to a value
     carried over the patch (texture coordinates, colors); ``cells (Q,s)`` local indices: corner c is c, point j
     of side c is n + c * inner + j (j from corner c on, ``inner`` = segments - 1 points a side), interior point
-    i follows. ``centers (Q,2)`` the middle of each cell in the domain.
+    i follows. ``centers (Q,2)`` the middle of each cell in the domain. ``kite (m,2)`` the points of a kite that are
+    its own, in the unit square: interior points ``c * m`` to ``(c + 1) * m`` are those of the kite at corner c, the
+    last one is the middle of the patch; none where a sampling has no kites.
     """
 
     sides: int
@@ -33,6 +35,7 @@ class Sampling:
     blend: Floats
     cells: Ints
     centers: Floats
+    kite: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
 
 def segments(level: int) -> int:
@@ -69,9 +72,10 @@ def kite_sampling(sides: int, level: int) -> Sampling:
     steps = (np.arange(k) + 0.5) / k
     ca, cb = (grid.ravel() for grid in np.meshgrid(steps, steps, indexing="ij"))
     centers = np.concatenate([_kite_weights(n, c, ca, cb) for c in range(n)]) @ corners
-    for array in (points, weights, cells, centers):
+    kite = np.stack([a, b], axis=1) / k
+    for array in (points, weights, cells, centers, kite):
         array.setflags(write=False)
-    return Sampling(n, inner, points, weights, cells, centers)
+    return Sampling(n, inner, points, weights, cells, centers, kite)
 
 
 @lru_cache(maxsize=64)
@@ -144,3 +148,32 @@ def _kite_indices(n: int, k: int) -> Ints:
         local[c, 1:k, k] = local[(c - 1) % n, k, 1:k]
         local[c, k, k] = first + n * k * (k - 1)
     return local
+
+
+def kite_coordinates(sides: int, points: Floats) -> tuple[Ints, Floats, Floats]:
+    """The kite of a patch that holds each of the domain points ``(m,2)``, and where it lies there.
+
+    Corner ``(m,)`` of the kite; coordinates ``(m,2)`` in the unit square, whose sides are bilinear in the kite: the
+    corner at (0, 0), the middle of the side that leaves it at (1, 0), the middle of the patch at (1, 1); and their
+    derivatives ``(m,2,2)`` by xi and eta.
+    """
+    turn = 2 * np.pi / sides
+    kite = np.rint(np.arctan2(points[:, 1], points[:, 0]) / turn).astype(np.int64) % sides
+    corner = domain_corners(sides)
+    radius, half = corner[0, 0], np.pi / sides
+    across = radius * np.cos(half) * np.sin(half)
+    ex = corner[kite] / radius
+    ey = np.stack([-ex[:, 1], ex[:, 0]], axis=1)
+    x, y = np.einsum("mi,mi->m", points, ex) / radius, np.einsum("mi,mi->m", points, ey) / across
+    # x = 1 - (a + b) (1 - c) + a b (1 - 2c) and y = a - b, with c = cos(half)^2
+    c = np.cos(half) ** 2
+    p = (1 - 2 * c) / 4
+    q, r = 1 - c, 1 - p * y * y - x
+    total = 2 * r / (q + np.sqrt(np.maximum(q * q - 4 * p * r, 0.0)))
+    a, b = (np.clip((total + sign * y) / 2, 0.0, 1.0) for sign in (1, -1))
+    x_a, x_b = -q + b * (1 - 2 * c), -q + a * (1 - 2 * c)
+    determinant = -(x_a + x_b)
+    by_x = np.stack([np.full_like(a, -1.0), np.full_like(a, -1.0)], axis=1) / determinant[:, None] / radius
+    by_y = np.stack([-x_b, x_a], axis=1) / determinant[:, None] / across
+    slopes = by_x[:, :, None] * ex[:, None] + by_y[:, :, None] * ey[:, None]
+    return kite, np.stack([a, b], axis=1), slopes

@@ -4,33 +4,59 @@ from __future__ import annotations
 
 import numpy as np
 
-from curvify.mesh import Floats
-from curvify.normals import dot, sum_by, unit
-from curvify.records import replaced
-from curvify.schemes.base import Patches
+from curvify.arrays import unit_rows
+from curvify.mesh import Floats, Ints
+from curvify.normals import sum_by, unit
+from curvify.records import record, replaced
+from curvify.schemes.base import Edges, Patches
 from curvify.sectors import sides_of_edges
 
 #: Normals whose cosine is below this have no mean worth the name.
 OPPOSITE = -0.99
 
 
+@record
+class MeanNormals:
+    """Edges whose normals are the means of two fields: their own and ``others (E,)``, which may be the same."""
+
+    edges: Edges
+    others: Ints
+
+    def points(self, edges: Ints, t: Floats) -> Floats:
+        """Points ``(3,e,m)``."""
+        return self.edges.points(edges, t)
+
+    def normals(self, fields: Ints, t: Floats) -> Floats:
+        """Unit normals ``(3,e,m)``."""
+        result = self.edges.normals(fields, t)
+        two = np.flatnonzero(self.others[fields] != fields)
+        other = self.edges.normals(self.others[fields[two]], t[two] if t.ndim > 1 else t)
+        result[:, two] = unit_rows(result[:, two] + other)
+        return result
+
+
 def weld_normals(patches: Patches) -> Patches:
     """The same surface with the normals of all sides of a vertex or edge averaged.
 
-    At a vertex, the unit mean of its sectors' normals; along an edge, the sum of its faces' normal fields, which have
-    equal lengths at its ends. Where two normals are opposite, as on the rim of a leaf, the first one stays.
+    At a vertex, the unit mean of its sectors' normals; along an edge, that of its faces' normals. Where two normals are
+    opposite, as on the rim of a leaf, the first one stays.
     """
     topology = patches.topology
     first, last = sides_of_edges(topology)
-    edges = np.flatnonzero(patches.side_field[first] != patches.side_field[last])
-    fields = patches.fields.copy()
-    total = fields[:, patches.side_field[first[edges]]] + fields[:, patches.side_field[last[edges]]]
-    own = np.moveaxis(fields[:, edges][..., [0, -1]], 0, -1)
-    other = np.moveaxis(fields[:, patches.side_field[last[edges]]][..., [0, -1]], 0, -1)
-    agreement = dot(unit(own), unit(other)).min(axis=(1, 2))
-    fields[:, edges] = np.where((agreement < OPPOSITE)[:, None], fields[:, edges], total)
-    normals = _vertex_normals(patches)
-    return replaced(patches, fields=fields, side_field=topology.edge.copy(), normals=normals)
+    fields = np.arange(len(topology.edges))
+    others = patches.side_field[last]
+    split = np.flatnonzero(patches.side_field[first] != others)
+    ends = np.array([0.0, 1.0])
+    cosine = np.einsum("cem,cem->em", patches.edges.normals(split, ends), patches.edges.normals(others[split], ends))
+    others = fields.copy()
+    kept = split[(cosine >= OPPOSITE).all(axis=1)]
+    others[kept] = patches.side_field[last[kept]]
+    return replaced(
+        patches,
+        edges=MeanNormals(patches.edges, others),
+        side_field=topology.edge.copy(),
+        normals=_vertex_normals(patches),
+    )
 
 
 def _vertex_normals(patches: Patches) -> Floats:

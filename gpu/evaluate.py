@@ -15,12 +15,13 @@ import numpy as np
 import numpy.typing as npt
 
 from curvify import evaluate, tables
+from curvify.arrays import as_slice
 from curvify.errors import DeviceError
 from curvify.gpu.products import Products, Singles, Table, pack_columns
 from curvify.gpu.programs import NORMALS, UNIT, VALUES, Kind
 from curvify.mesh import Bools, Floats, Ints
 from curvify.sampling import Sampling
-from curvify.schemes.base import Form, PatchClass, Patches, bernstein_basis
+from curvify.schemes.base import BezierEdges, Edges, Form, KiteForms, PatchClass, Patches, bernstein_basis
 
 #: Numbers of Chebyshev points tried, fewest first.
 NODE_COUNTS = (8, 12, 16, 24, 32, 48)
@@ -93,17 +94,20 @@ class GpuBackend:
         names = ("vendor", "renderer", "version", "hardware", "compute")
         return {"name": self.name} | {name: getattr(self.device, name) for name in names}
 
-    def edges(self, curves: Floats, fields: Floats, t: Floats) -> tuple[Floats, Floats]:
-        """Positions and unit normals ``(3,e,m)`` at ``t (m,)`` on edges, as ``evaluate.edge_points``."""
-        if not len(t):
-            return np.empty((3, curves.shape[1], 0)), np.empty((3, fields.shape[1], 0))
+    def edges(self, edges: Edges, ids: Ints, fields: Ints, t: Floats) -> tuple[Floats, Floats]:
+        """Positions and unit normals ``(3,e,m)`` at ``t (m,)`` on edges ``ids (e,)`` with normal fields ``(e,)``; those
+        that are no Bezier curves on the processor.
+        """
+        if not (len(t) and isinstance(edges, BezierEdges)):
+            return edges.points(ids, t), edges.normals(fields, t)
+        curves, lines = edges.curves[:, as_slice(ids)], edges.fields[:, as_slice(fields)]
         vectors = Vectors.pack(curves, curves.shape[2])
         positions = vectors.restore(self._bezier(VALUES, vectors, curves.shape[2], t), curves.dtype)
-        normals = self._bezier(UNIT, Vectors.pack(fields, 0), fields.shape[2], t)
+        normals = self._bezier(UNIT, Vectors.pack(lines, 0), lines.shape[2], t)
         result = normals.astype(np.float64).transpose(2, 0, 1)
         lost = np.flatnonzero(_without_normal(normals))
         if len(lost):
-            result[:, lost] = evaluate.edge_normals(fields[:, lost], t)
+            result[:, lost] = edges.normals(fields[lost], t)
         return positions.transpose(2, 0, 1), result
 
     def _bezier(self, kind: Kind, vectors: Vectors, points: int, t: Floats) -> Singles:
@@ -126,11 +130,14 @@ class GpuBackend:
         """Write into ``positions`` and ``normals (f,S,3)``, as ``evaluate.fill_patches`` does."""
         if not len(sampling.points):
             return
+        surface = patch_class.surface
         fill = partial(self._fill, rows=rows, points=sampling.points, grid=(patch_class.sides, level))
-        if patch_class.normals is None:
-            left = fill(patch_class.surface, NORMALS, positions=positions, normals=normals)
+        if isinstance(surface, KiteForms):
+            left = self._fill_kites(surface, rows, sampling, level, positions, normals)
+        elif patch_class.normals is None:
+            left = fill(surface, NORMALS, positions=positions, normals=normals)
         else:
-            left = fill(patch_class.surface, VALUES, positions=positions)
+            left = fill(surface, VALUES, positions=positions)
             left |= fill(patch_class.normals, UNIT, normals=normals)
         left |= _without_normal(normals)
         if left.any():
@@ -138,6 +145,21 @@ class GpuBackend:
             exact = np.empty((2, len(part), *positions.shape[1:]))
             evaluate.fill_patches(patches, patch_class, rows[part], sampling, level, tolerance, exact[0], exact[1])
             positions[part], normals[part] = exact
+
+    def _fill_kites(
+        self, surface: KiteForms, rows: Ints, sampling: Sampling, level: int, positions: Floats, normals: Floats
+    ) -> Bools:
+        """Write a surface of kites into ``positions`` and ``normals (f,S,3)``; which patches ``(f,)`` it left out."""
+        left = np.zeros(len(rows), dtype=bool)
+        for part, form, corners, first, points, grid in evaluate.kite_blocks(surface, rows, sampling, level):
+            if len(points):
+                values, directions = np.empty((2, len(part), len(points), 3), dtype=positions.dtype)
+                left[part] |= self._fill(
+                    form, NORMALS, rows=corners, points=points, grid=grid, positions=values, normals=directions
+                )
+                place = _place(part), slice(first, first + len(points))
+                positions[place], normals[place] = values, directions
+        return left
 
     def _fill(
         self,

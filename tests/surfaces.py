@@ -296,8 +296,8 @@ def side_points(sides: int, side: int, t: npt.ArrayLike) -> Array:
 def half_edge_polynomials(patches: Patches, corners: npt.ArrayLike) -> tuple[Array, Array]:
     """Bezier points ``(m,4,3)`` of the curve and of the normal field of half-edges, in their own direction."""
     ids = np.asarray(corners, dtype=np.int64)
-    curves = np.moveaxis(patches.curves, 0, -1)[patches.topology.edge[ids]]
-    fields = np.moveaxis(patches.fields, 0, -1)[patches.side_field[ids]]
+    curves = np.moveaxis(patches.edges.curves, 0, -1)[patches.topology.edge[ids]]
+    fields = np.moveaxis(patches.edges.fields, 0, -1)[patches.side_field[ids]]
     backward = ~patches.topology.forward[ids]
     for points in (curves, fields):
         points[backward] = points[backward][:, ::-1]

@@ -71,7 +71,7 @@ def test_marked_samples_are_sound_and_smooth_where_nothing_is_marked(name: str, 
 
 def test_ring_a_is_the_mesh_without_marks() -> None:
     plain = curvify.surface(curvify.read(FOLDER / "ring.obj"))
-    assert np.array_equal(make("ring-a-plain").patches.curves, plain.patches.curves)
+    assert np.array_equal(make("ring-a-plain").patches.edges.curves, plain.patches.edges.curves)
     assert np.ptp(heights(plain, 1)) > 0.05
 
 
@@ -81,7 +81,7 @@ def test_ring_b_and_e_have_a_planar_top_and_bottom_with_round_rims(name: str) ->
     for band in LEVEL_BANDS:
         assert np.ptp(heights(surface, band)) < 1e-12
     for ring in LEVEL_RINGS:
-        curves = surface.patches.curves[:, edges_round(surface, ring)]
+        curves = surface.patches.edges.curves[:, edges_round(surface, ring)]
         middle = (curves @ np.array([1, 3, 3, 1])) / 8
         radius = np.hypot(*curves[:2, :, 0])
         assert np.abs(np.hypot(*middle[:2]) / radius - 1).max() < 1e-5
@@ -90,7 +90,7 @@ def test_ring_b_and_e_have_a_planar_top_and_bottom_with_round_rims(name: str) ->
 def test_ring_c_has_its_edges_around_the_axis_in_level_planes() -> None:
     level, plain = make("ring-c-level"), make("ring-a-plain")
     spreads = {
-        which: [np.ptp(s.patches.curves[2, edges_round(s, ring)]) for ring in LEVEL_RINGS]
+        which: [np.ptp(s.patches.edges.curves[2, edges_round(s, ring)]) for ring in LEVEL_RINGS]
         for which, s in (("level", level), ("plain", plain))
     }
     assert max(spreads["level"]) < 1e-12
@@ -100,12 +100,12 @@ def test_ring_c_has_its_edges_around_the_axis_in_level_planes() -> None:
 
 def test_ring_d_is_made_of_cones() -> None:
     surface = make("ring-d-cones")
-    start, first, last, end = np.moveaxis(surface.patches.curves[:, rungs(surface)], 2, 0)
+    start, first, last, end = np.moveaxis(surface.patches.edges.curves[:, rungs(surface)], 2, 0)
     along = (end - start) / np.linalg.norm(end - start, axis=0)
     for point in (first, last):
         assert np.linalg.norm(np.cross(point - start, along, axis=0), axis=0).max() < 1e-12
     for ring in range(6):
-        assert np.ptp(surface.patches.curves[2, edges_round(surface, ring)]) < 1e-12
+        assert np.ptp(surface.patches.edges.curves[2, edges_round(surface, ring)]) < 1e-12
     dense = surface.refine(4)
     assert dense.source_faces is not None
     for band in range(6):  # the cones themselves, to the accuracy of the patches
@@ -146,7 +146,7 @@ def test_the_knob_has_flat_ends_round_rims_and_straight_walls() -> None:
     assert dense.source_faces is not None
     for face, height in ((0, 0.0), (41, 1.0)):
         assert np.abs(dense.positions[dense.faces[dense.source_faces == face], 2] - height).max() < 1e-14
-    start, first, last, end = np.moveaxis(surface.patches.curves[:, rungs(surface)], 2, 0)
+    start, first, last, end = np.moveaxis(surface.patches.edges.curves[:, rungs(surface)], 2, 0)
     along = (end - start) / np.linalg.norm(end - start, axis=0)
     assert np.linalg.norm(np.cross(first - start, along, axis=0), axis=0).max() < 1e-12
     assert np.linalg.norm(np.cross(last - start, along, axis=0), axis=0).max() < 1e-12

@@ -8,7 +8,7 @@ from typing import Any
 from curvify.errors import OptionError
 
 #: Scheme names in the order they are listed.
-NAMES = ("gregory", "png1", "pn", "phong", "overveld")
+NAMES = ("gregory", "blend", "png1", "pn", "phong", "overveld")
 
 
 def load_scheme(name: str) -> Any:

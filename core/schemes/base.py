@@ -16,6 +16,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from curvify.arrays import as_slice
 from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.records import field, record
 from curvify.sampling import Sampling
@@ -97,6 +98,21 @@ class Form:
 
 
 @record
+class KiteForms:
+    """A surface made of one form for each kite of a patch: the quad between a corner, the middles of its two sides
+    and the middle of the patch.
+
+    ``forms``, and ``which (f,n)`` of them each kite of the patches has; ``corners (f,)`` the first corner of each
+    patch in the topology. Forms live on the unit square, the patch's corner at (0, 0) and its side along the first
+    coordinate; their ``controls`` take corners of the topology.
+    """
+
+    forms: list[Form]
+    which: Ints
+    corners: Ints
+
+
+@record
 class PatchClass:
     """Patches that share their tables: ``patches (f,)`` ids, ascending, all with ``sides`` sides.
 
@@ -105,8 +121,57 @@ class PatchClass:
 
     sides: int
     patches: Ints
-    surface: Form
+    surface: Form | KiteForms
     normals: Form | None = None
+
+
+class Edges(Protocol):
+    """The curves over the edges of a mesh, and the normals of the surface along them.
+
+    Both are evaluated in the edges' canonical direction, elementwise: an edge gets the same bits wherever it stands.
+    """
+
+    def points(self, edges: Ints, t: Floats) -> Floats:
+        """Points ``(3,e,m)`` of edges ``(e,)`` at ``t``: ``(m,)`` for all, or ``(e,1)``, one for each."""
+
+    def normals(self, fields: Ints, t: Floats) -> Floats:
+        """Unit normals ``(3,e,m)`` of normal fields ``(e,)`` at ``t`` as above."""
+
+
+@record
+class BezierEdges:
+    """Cubics and polynomial normals: ``curves (3,E,d+1)`` Bezier points of the edges, ``fields (3,N,q+1)`` of the edge
+    normals, which are not of unit length.
+    """
+
+    curves: Floats
+    fields: Floats
+
+    def points(self, edges: Ints, t: Floats) -> Floats:
+        """Points ``(3,e,m)``."""
+        return bezier_points(self.curves[:, as_slice(edges)], t)
+
+    def normals(self, fields: Ints, t: Floats) -> Floats:
+        """Unit normals ``(3,e,m)``, zero where a field vanishes."""
+        normals = bezier_points(self.fields[:, as_slice(fields)], t)
+        length = np.sqrt(np.einsum("cem,cem->em", normals, normals))
+        length[length == 0] = 1.0
+        normals /= length
+        return normals
+
+
+def bezier_points(points: Floats, t: Floats) -> Floats:
+    """Values ``(3,e,m)`` of Bezier polynomials ``(3,e,d+1)`` at ``t``: ``(m,)`` for all, or ``(e,1)``, one for each.
+
+    Plain elementwise arithmetic: an edge gets the same bits wherever it stands. In memory the edges come last.
+    """
+    rows = np.ascontiguousarray(points.transpose(2, 0, 1))
+    basis = bernstein_basis(len(rows) - 1, np.atleast_2d(t).T)[:, :, None]
+    total = rows[0] * basis[0]
+    term = np.empty_like(total)
+    for i in range(1, len(rows)):
+        total += np.multiply(rows[i], basis[i], out=term)
+    return total.transpose(1, 2, 0)
 
 
 @record
@@ -116,10 +181,9 @@ class Patches:
     ``positions (V,3)`` of the input's vertices, ``stand_in (V,)`` the vertex that each was welded to; ``topology`` of
     the patches (a face may be cut into several); ``source_faces (P,)`` the input face of each patch, ascending;
     ``source_corners (C,)`` the input corner of each patch corner. The last D edges lie inside cut faces,
-    ``inner_faces (D,)``, ascending. ``curves (3,E,d+1)`` Bezier points of the edges; ``fields (3,N,q+1)`` Bezier
-    points of edge normals, not of unit length, the first E those of the edges' first half-edges, and
-    ``side_field (C,)`` the one on each half-edge; ``normals (C,3)`` unit normal of each patch corner.
-    ``warnings``, ``counts`` and the number of ``marks`` by source and kind for the report.
+    ``inner_faces (D,)``, ascending. ``edges``: the E curves over the edges and N normal fields along them, the first E
+    those of the edges' first half-edges; ``side_field (C,)`` the one on each half-edge; ``normals (C,3)`` unit normal
+    of each patch corner. ``warnings``, ``counts`` and the number of ``marks`` by source and kind for the report.
     """
 
     positions: Floats
@@ -128,8 +192,7 @@ class Patches:
     source_corners: Ints
     stand_in: Ints
     inner_faces: Ints
-    curves: Floats
-    fields: Floats
+    edges: Edges
     side_field: Ints
     normals: Floats
     classes: list[PatchClass]

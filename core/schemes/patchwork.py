@@ -21,7 +21,16 @@ from curvify.polygons import newell_normals
 from curvify.prepare import Coarse
 from curvify.records import field, record
 from curvify.sampling import Sampling
-from curvify.schemes.base import PatchClass, Patches, bernstein, bernstein_basis, bernstein_slope, bernstein_slopes
+from curvify.schemes.base import (
+    BezierEdges,
+    Edges,
+    PatchClass,
+    Patches,
+    bernstein,
+    bernstein_basis,
+    bernstein_slope,
+    bernstein_slopes,
+)
 from curvify.schemes.cross_tangents import Sides
 from curvify.sectors import Features, end_normals, sides_of_edges
 from curvify.topology import Topology, link_half_edges
@@ -125,25 +134,44 @@ class Patchwork:
 
     def patches(self, classes: list[PatchClass], sampling: Callable[[int, int], Sampling]) -> Patches:
         """Everything a backend and the numbering need."""
-        loops = self.coarse.loops
-        return Patches(
-            positions=self.coarse.positions,
-            topology=self.topology,
-            source_faces=loops.source_faces[self.split.source_faces],
-            source_corners=loops.source_corners[self.split.source_corners],
-            stand_in=self.coarse.stand_in,
-            inner_faces=loops.source_faces[self.split.diagonal_faces],
-            curves=self.curves,
-            fields=self.fields,
-            side_field=self.side_field,
-            normals=self.normals,
-            classes=classes,
-            sampling=sampling,
-            mesh=self.coarse.mesh,
-            warnings=self.coarse.warnings + self.warnings,
-            counts=self.coarse.counts | self.counts,
-            marks=self.coarse.marks.counts,
+        edges = BezierEdges(self.curves, self.fields)
+        patches = assemble_patches(
+            self.coarse, self.split, self.topology, edges, self.side_field, self.normals, sampling
         )
+        patches.classes = classes
+        patches.warnings += self.warnings
+        patches.counts |= self.counts
+        return patches
+
+
+def assemble_patches(
+    coarse: Coarse,
+    split: Split,
+    topology: Topology,
+    edges: Edges,
+    side_field: Ints,
+    normals: Floats,
+    sampling: Callable[[int, int], Sampling],
+) -> Patches:
+    """Patches over the pieces of a split mesh, their classes still missing."""
+    loops = coarse.loops
+    return Patches(
+        positions=coarse.positions,
+        topology=topology,
+        source_faces=loops.source_faces[split.source_faces],
+        source_corners=loops.source_corners[split.source_corners],
+        stand_in=coarse.stand_in,
+        inner_faces=loops.source_faces[split.diagonal_faces],
+        edges=edges,
+        side_field=side_field,
+        normals=normals,
+        classes=[],
+        sampling=sampling,
+        mesh=coarse.mesh,
+        warnings=list(coarse.warnings),
+        counts=dict(coarse.counts),
+        marks=coarse.marks.counts,
+    )
 
 
 class FoldRule(NamedTuple):

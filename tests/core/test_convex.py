@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from curvify import dissect
-from curvify.convex import Split, cut_along, split_at_corners, split_polygons
+from curvify.convex import Split, split_at_corners, split_polygons, whole_faces
 from curvify.errors import OptionError
 from curvify.mesh import Bools, Floats, Ints
 from curvify.polygons import judge, newell_normals, next_corners, previous_corners
@@ -39,12 +39,6 @@ TWO_HOLES: Keyhole = (
     [(0, 0), (8, 0), (8, 4), (0, 4), (1, 1), (1, 3), (3, 3), (3, 1), (5, 1), (5, 3), (7, 3), (7, 1)],
     [0, 1, 11, 8, 9, 10, 11, 1, 2, 3, 0, 4, 5, 6, 7, 4],
 )
-
-
-def whole_faces(face_offsets: np.ndarray, face_vertices: np.ndarray) -> Split:
-    """Every face as one piece."""
-    reasons = np.zeros(len(face_offsets) - 1, dtype=np.uint8)
-    return cut_along(face_offsets, face_vertices, np.zeros((0, 2), dtype=np.int64), reasons)
 
 
 def corner_crosses(positions: np.ndarray, face_offsets: np.ndarray, face_vertices: np.ndarray) -> np.ndarray:

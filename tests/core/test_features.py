@@ -96,7 +96,7 @@ def test_an_open_rim_stays_planar_beside_a_crease(kind: str) -> None:
     mesh = vase()
     ring = [(30 + k, 30 + (k + 1) % 10) for k in range(10)]
     surface = curvify.surface(creased(mesh, ring), cross_tangent=kind)
-    curves = surface.patches.curves
+    curves = surface.patches.edges.curves
     topology = surface.patches.topology
     boundary = ~topology.interior
     assert np.abs(np.ptp(curves[2][boundary], axis=1)).max() < 1e-15
@@ -133,7 +133,7 @@ def test_sharpness_is_the_share_of_the_angle_and_leaves_the_crease_where_it_is()
     angles = []
     for sharpness in (0.25, 0.5, 1.0):
         patches = curvify.surface(creased(mesh, rims(12), sharpness)).patches
-        assert np.abs(patches.curves[:, edge] - whole.curves[:, edge]).max() < 1e-14
+        assert np.abs(patches.edges.curves[:, edge] - whole.edges.curves[:, edge]).max() < 1e-14
         found = edge_angles(patches)
         angles.append(found.angles[found.edges == edge].mean())
     assert angles[0] < angles[1] < angles[2]
@@ -218,14 +218,14 @@ def test_a_straight_edge_is_straight_and_stays_smooth(kind: str) -> None:
     edge = 7
     pair = edges_of(mesh)[[edge]]
     surface = curvify.surface(mesh, marks=Marks(straight_edges=pair), cross_tangent=kind)
-    start, first, last, end = surface.patches.curves[:, edge].T
+    start, first, last, end = surface.patches.edges.curves[:, edge].T
     for point in (first, last):
         assert np.linalg.norm(np.cross(point - start, unit(end - start))) < 1e-15
     found = edge_angles(surface.patches)
     assert found.smooth.all()
     assert found.angles.max() < 1e-9
-    plain = curvify.surface(mesh, cross_tangent=kind).patches.curves[:, edge]
-    assert np.abs(plain - surface.patches.curves[:, edge]).max() > 1e-3
+    plain = curvify.surface(mesh, cross_tangent=kind).patches.edges.curves[:, edge]
+    assert np.abs(plain - surface.patches.edges.curves[:, edge]).max() > 1e-3
 
 
 def test_two_straight_edges_at_a_vertex_span_its_tangent_plane() -> None:
@@ -257,10 +257,10 @@ def test_an_edge_normal_lays_the_edge_into_its_plane(kind: str) -> None:
     middle = mesh.positions[edges[level]].mean(axis=1)
     bent = Marks(bent_edges=edges[level], edge_normals=unit(middle * [1, 1, 0]))
     surface = curvify.surface(mesh, marks=bent, cross_tangent=kind)
-    heights = surface.patches.curves[2, level]
+    heights = surface.patches.edges.curves[2, level]
     outer = np.hypot(*middle[:, :2].T) > 1
     assert np.ptp(heights[outer], axis=1).max() < 1e-15
-    plain = curvify.surface(mesh, cross_tangent=kind).patches.curves[2, level]
+    plain = curvify.surface(mesh, cross_tangent=kind).patches.edges.curves[2, level]
     assert np.ptp(plain[outer], axis=1).max() > 1e-3
     assert edge_angles(surface.patches).angles.max() < 1e-9
 
@@ -341,7 +341,7 @@ def test_bulging_moves_the_middle_and_keeps_the_sides(amount: float, kind: str) 
         found = edge_angles(surface.patches)
         assert found.smooth.all()
         assert found.angles.max() < 1e-9
-        assert np.array_equal(surface.patches.curves, plain.patches.curves)
+        assert np.array_equal(surface.patches.edges.curves, plain.patches.edges.curves)
 
 
 def test_alpha_of_a_face() -> None:

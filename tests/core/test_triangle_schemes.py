@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 
 import curvify
-from curvify import evaluate
 from curvify.errors import OptionError
 from curvify.mesh import Marks, PolygonMesh
 from curvify.quality import edge_angles
-from curvify.schemes.base import Patches
+from curvify.schemes.base import Patches, bernstein_basis
 from curvify.schemes.png1_basis import png1_columns
 from curvify.schemes.triangles import barycentric
 from surfaces import (
@@ -93,9 +92,9 @@ def side_normals(surface: curvify.Surface, t: Array) -> tuple[Array, Array]:
     points = (1 - t)[:, None] * start[:, None] + t[:, None] * end[:, None]
     _, own = surface.evaluate(np.repeat(topology.faces, len(t)), points.reshape(-1, 2))
     canonical = np.where(topology.forward[:, None], t, 1 - t)
-    fields = np.moveaxis(patches.fields[:, patches.side_field], 0, -1)
+    fields = np.moveaxis(patches.edges.fields[:, patches.side_field], 0, -1)
     degree = fields.shape[1] - 1
-    basis = evaluate.bernstein_basis(degree, canonical)
+    basis = bernstein_basis(degree, canonical)
     return own.reshape(*canonical.shape, 3), unit(np.einsum("qht,hqc->htc", basis, fields))
 
 
@@ -197,7 +196,7 @@ def test_fields_of_sides_are_the_normals_of_their_own_patches_also_on_lifted_cre
 
 def test_fields_of_sides_are_the_normals_of_their_own_patches_on_creases_between_sectors() -> None:
     surface = curvify.surface(noisy(cube(), 0.1), "png1", sharp_angle=60, kappa=-0.1)
-    assert len(surface.patches.fields[0]) > len(surface.patches.curves[0])
+    assert len(surface.patches.edges.fields[0]) > len(surface.patches.edges.curves[0])
     own, field = side_normals(surface, np.array([0.1, 0.4, 0.5, 0.8]))
     assert np.abs(own - field).max() < 1e-12
 
@@ -207,7 +206,7 @@ def test_a_lift_bends_the_insides_and_leaves_curves_and_end_normals() -> None:
     pair = mesh.face_vertices[:2]
     marked = mesh.with_(marks=Marks(curled_edges=pair[None], kappas=np.array([-0.2])))
     plain, lifted = curvify.surface(mesh, "png1"), curvify.surface(marked, "png1")
-    assert np.array_equal(plain.patches.curves, lifted.patches.curves)
+    assert np.array_equal(plain.patches.edges.curves, lifted.patches.edges.curves)
     found = edge_angles(lifted.patches, (0.001, 0.5))
     (crease,) = np.flatnonzero(~found.smooth)
     assert found.angles[crease, 1] > 20

@@ -126,6 +126,14 @@ def creased() -> PolygonMesh:
     return sharp
 
 
+@pytest.mark.parametrize("make", [mixed_ball, creased], ids=["polygons", "quads"])
+def test_blending_surfaces_are_evaluated_on_the_device(make, gpu, left):
+    surface = curvify.surface(make(), "blend", sharp_angle=80)
+    for level in (1, 2, 5):
+        check_close(gaps(surface, level, gpu))
+    assert left == []
+
+
 def test_creases_have_normals_for_each_side_and_one_curve(gpu):
     surface = curvify.surface(creased(), sharp_from="normals")
     check_close(gaps(surface, 3, gpu))
