@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from curvify.deviation import deviations
     from curvify.errors import CurvifyError, DeviceError, FormatError, LimitError, MeshError, OptionError
     from curvify.inspection import describe
+    from curvify.mask import read_mask
     from curvify.mesh import DenseMesh, Marks, PolygonMesh
     from curvify.pieces import split_mesh
     from curvify.refinement import Refinable, Surface, refinable, refine, surface
@@ -44,6 +45,7 @@ _WHERE = {
     "compare_surfaces": "compare",
     "describe": "inspection",
     "deviations": "deviation",
+    "read_mask": "mask",
     "refinable": "refinement",
     "refine": "refinement",
     "repair_mesh": "repair",
@@ -70,6 +72,7 @@ __all__ = [
     "describe",
     "deviations",
     "read",
+    "read_mask",
     "refinable",
     "refine",
     "repair_mesh",

@@ -11,12 +11,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from curvify import evaluate
-from curvify.arrays import cross
 from curvify.backends import Backend, open_backend
 from curvify.errors import LimitError, OptionError
 from curvify.jobs import dense_jobs, dense_layout
@@ -28,6 +27,9 @@ from curvify.sinks import ArraySink, DenseLayout, Sink
 from curvify.threads import Job, Progress, run_jobs
 from curvify.topology import Topology
 from curvify.weld import cell_sources, number_dense_mesh, predict_faces
+
+if TYPE_CHECKING:
+    from curvify.mask import Mask
 
 #: Faces that a dense mesh may have unless the caller allows more.
 MAX_FACES = 50_000_000
@@ -187,14 +189,7 @@ class Surface(Refinable):
         if len(ids) and (ids.min() < 0 or ids.max() >= len(self.sides)):
             raise OptionError(f"patches are numbered 0 to {len(self.sides) - 1}")
         _check_inside(self.sides[ids], places)
-        position, by_xi, by_eta = evaluate.evaluate_at(self.patches, ids, places)
-        normal = cross(by_xi, by_eta)
-        square = (normal**2).sum(axis=1)
-        speeds = (by_xi**2).sum(axis=1) * (by_eta**2).sum(axis=1)
-        parallel = square <= evaluate.PARALLEL * speeds
-        normal /= np.sqrt(np.where(parallel, 1.0, square))[:, None]
-        normal[parallel] = evaluate.blended_normals(self.patches, ids[parallel], places[parallel])
-        return position, normal
+        return evaluate.surface_at(self.patches, ids, places)
 
     def weld_normals(self) -> Surface:
         """The same surface with one normal for every vertex of its dense mesh, also on creases."""
@@ -240,6 +235,24 @@ class Surface(Refinable):
         dense = super().refine(level, dtype, **run)
         dense.source_patches, dense.source_parameters = cell_sources(self.patches, level)
         return dense
+
+    def trim(
+        self,
+        mask: Mask,
+        level: int = 5,
+        dtype: object = np.float64,
+        *,
+        mapping: str = "face",
+        mode: str = "clip",
+        **run: Any,
+    ) -> PolygonMesh:
+        """What an image keeps of the dense mesh of level k: polygons with normals at their corners; see ``trim.trim``.
+
+        ``run`` as in ``stream``; the limit of faces holds for the whole mesh. Raises CurvifyError.
+        """
+        from curvify.trim import trim
+
+        return trim(self.patches, self.refine(level, dtype, **run), int(level), mask, mapping, mode)
 
     def _work(self, level: int, dtype: np.dtype[Any]) -> tuple[DenseLayout, JobsFor]:
         """Layout of the dense mesh, and its jobs for a backend."""
