@@ -13,10 +13,11 @@ from curvify.schemes import NAMES
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-SURFACE, SIMPLIFYING, SHARP, MESH, OUTPUT, RUNNING, MESSAGES = (
+SURFACE, SIMPLIFYING, SHARP, TRIMMING, MESH, OUTPUT, RUNNING, MESSAGES = (
     "Surface",
     "Simplifying",
     "Sharp features",
+    "Trimming",
     "Input mesh",
     "Output",
     "Running",
@@ -171,6 +172,21 @@ overveld = with_options(
     ),
 )
 
+chart = option(
+    SURFACE,
+    "--chart",
+    type=click.Choice(["auto", "conformal", "polar"]),
+    help="blend: the parameters around a vertex: the paper's, polar ones, or for each number of faces the better.  "
+    "[default: auto]",
+)
+blend_order = option(
+    SURFACE,
+    "--blend-order",
+    type=click.Choice(["3", "5"]),
+    callback=lambda _context, _parameter, value: None if value is None else int(value),
+    help="blend: degree of the blending function; 5 bounds the curvature at vertices of three faces.  [default: 3]",
+)
+
 # --- simplifying ------------------------------------------------------------------------------------------------
 
 faces = option(SIMPLIFYING, "--faces", type=POSITIVE, metavar="N", help="How many polygons there should be.")
@@ -203,6 +219,30 @@ simplify = option(
     help="First turn IN into N polygons, as 'curvify simplify --faces N' does.",
 )
 
+# --- trimming ---------------------------------------------------------------------------------------------------
+
+trim = option(
+    TRIMMING,
+    "--trim",
+    metavar="FILE",
+    help="Keep what a PNG image has white. Needs memory for the whole dense mesh.",
+)
+trim_map = option(
+    TRIMMING,
+    "--trim-map",
+    type=click.Choice(["face", "uv"]),
+    help="Lay the image on each quad, from its first corner on, and on each of the n quads of other polygons, without "
+    "regard to neighbors (face); or on the mesh by its texture coordinates (uv).  [default: face]",
+)
+trim_mode = option(
+    TRIMMING,
+    "--trim-mode",
+    type=click.Choice(["clip", "drop"]),
+    help="Cut along the image, or leave out the cells that are not kept whole. What is smaller than a cell is missed.  "
+    "[default: clip]",
+)
+trim_invert = option(TRIMMING, "--trim-invert", is_flag=True, help="Keep what is black instead.")
+
 # --- input ------------------------------------------------------------------------------------------------------
 
 marks = option(
@@ -218,6 +258,19 @@ sharp_angle = option(
     type=float,
     metavar="DEG",
     help="Make edges sharp at which the faces turn by more than this angle.",
+)
+sharp_model = option(
+    SHARP,
+    "--sharp-model",
+    type=click.Choice(["sided", "paper", "paper-fixed"]),
+    help="blend: a surface on each side of a crease; the points and curves of the paper; those with its misprints "
+    "mended. A crease shows only where the mesh bends.  [default: sided]",
+)
+boundary_corners = option(
+    SHARP,
+    "--boundary-corners",
+    type=click.Choice(["keep", "smooth"]),
+    help="blend: keep the corners of open boundaries, or smooth them.  [default: keep]",
 )
 sharp_from = option(
     SHARP,

@@ -121,10 +121,10 @@ def refine_report(run: Run, layout: DenseLayout, recorder: Recorder) -> dict[str
     """The report of `refine`.
 
     ``timings`` are seconds. ``g1`` is measured from each face's own derivatives, in degrees; null for a recursive
-    scheme. ``vertex_deviation`` is
-    the largest distance between a vertex of the input, rounded to the output's type, and the same vertex as written:
-    0 where the surface interpolates. ``vertex_rounding`` is how far that rounding moved a vertex at most.
-    ``volume_ratio`` is null for a mesh that is not closed, ``bytes`` for an output that is not a file or a pipe.
+    scheme. ``vertex_deviation`` is the largest distance between a vertex of the input, rounded to the output's type,
+    and the same vertex as written: 0 where the surface interpolates. ``vertex_rounding`` is how far that rounding moved
+    a vertex at most. ``volume_ratio`` is null for a mesh that is not closed or was trimmed, ``wedges`` after trimming,
+    ``bytes`` for an output that is not a file or a pipe.
     """
     request, surface = run.request, run.surface
     return {
@@ -140,8 +140,8 @@ def refine_report(run: Run, layout: DenseLayout, recorder: Recorder) -> dict[str
         "counts": {
             "input": surface.counts,
             "output": {
-                "vertices": layout.vertex_count,
-                "wedges": layout.wedge_count,
+                "vertices": layout.vertex_count if run.trimmed is None else run.trimmed[0],
+                "wedges": layout.wedge_count if run.trimmed is None else None,
                 "faces": run.faces,
                 "bytes": run.bytes,
             },
@@ -151,7 +151,7 @@ def refine_report(run: Run, layout: DenseLayout, recorder: Recorder) -> dict[str
         "g1": continuity(surface.patches) if isinstance(surface, Surface) else None,
         "vertex_deviation": _number(recorder.deviation),
         "vertex_rounding": _number(recorder.rounding),
-        "volume_ratio": _number(recorder.volume_ratio),
+        "volume_ratio": _number(recorder.volume_ratio if run.trimmed is None else None),
         "marks": surface.marks,
         "warnings": run.warnings,
     }

@@ -6,9 +6,9 @@ import io
 import os
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import fields
-from typing import Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
@@ -17,15 +17,19 @@ from curvify.cli import files
 from curvify.cli.console import Console, size
 from curvify.cli.predict import predicted_bytes, predicted_faces
 from curvify.cli.report import Recorder, refine_report, write_report
+from curvify.cli.trimming import check_trim, load_mask, trimmed_output
 from curvify.errors import FormatError, LimitError, MeshError, OptionError
 from curvify.formats.dense import dense_output
 from curvify.mesh import Marks, PolygonMesh
 from curvify.records import field, record
 from curvify.refinement import Refinable, refinable
 from curvify.schemes import NAMES, load_scheme
-from curvify.sinks import DenseLayout
+from curvify.sinks import DenseLayout, Sink
 from curvify.threads import processors
 from curvify.words import count_of
+
+if TYPE_CHECKING:
+    from curvify.mask import Mask
 
 #: Options that a scheme may have, one or several.
 SCHEME_OPTIONS = (
@@ -37,6 +41,10 @@ SCHEME_OPTIONS = (
     "sharp_from",
     "weld",
     "split_rule",
+    "chart",
+    "blend_order",
+    "sharp_model",
+    "boundary_corners",
     "kappa",
     "crease_units",
     "depth",
@@ -67,6 +75,10 @@ class Request:
     sharp_from: str | None
     weld: str | None
     split_rule: str | None
+    chart: str | None
+    blend_order: int | None
+    sharp_model: str | None
+    boundary_corners: str | None
     kappa: float | None
     crease_units: str | None
     depth: int | None
@@ -76,6 +88,10 @@ class Request:
     apex: float | None
     rim: bool
     planar: tuple[int, ...]
+    trim: str | None
+    trim_map: str | None
+    trim_mode: str | None
+    trim_invert: bool
     input_format: str | None
     output_format: str | None
     triangulate: bool
@@ -128,6 +144,8 @@ class Run:
     bytes: int | None = None
     backend: dict[str, Any] = field(default_factory=dict)
     bytes_sent: int = 0
+    mask: Mask | None = None
+    trimmed: tuple[int, int] | None = None
 
     @property
     def triangulate(self) -> bool:
@@ -141,7 +159,9 @@ class Run:
 
     @property
     def faces(self) -> int:
-        """Faces that will be written."""
+        """Faces that will be written, or were after trimming."""
+        if self.trimmed is not None:
+            return self.trimmed[1]
         return predicted_faces(self.surface, self.request.level, self.triangulate, self.request.max_faces)
 
     @property
@@ -153,6 +173,10 @@ class Run:
             "marks": request.marks,
             "simplify": request.simplify,
             "precision": self.dtype.name,
+            "trim": request.trim,
+            "trim_map": request.trim and (request.trim_map or "face"),
+            "trim_mode": request.trim and (request.trim_mode or "clip"),
+            "trim_invert": request.trim_invert,
             "triangulate": self.triangulate,
             "weld_normals": request.weld_normals,
             "ascii": request.ascii,
@@ -173,13 +197,14 @@ def refine_file(request: Request) -> Run:
         with timed(seconds, "simplify"):
             mesh, notes = _simplified(request, mesh, console)
     marks = None if request.marks is None else read_marks(request.marks)
+    mask = load_mask(request)
     with timed(seconds, "prepare"), files.naming(request.source, MeshError):
         made = refinable(mesh, request.scheme, **request.scheme_options, marks=marks)
     warnings = [f"{request.source}: {text}" for text in [*notes, *made.warnings]]
     for text in warnings:
         console.warn(text)
     threads = request.threads or processors()
-    run = Run(request, options, threads, mesh, made, request.dtype(mesh), format, warnings, seconds)
+    run = Run(request, options, threads, mesh, made, request.dtype(mesh), format, warnings, seconds, mask=mask)
     _check_limit(run)
     if request.dry_run:
         _tell_prediction(run, console)
@@ -221,6 +246,7 @@ def plain_options(options: Any) -> dict[str, Any]:
 def check(request: Request) -> tuple[Any, str]:
     """The scheme's options and the format of OUT. Raises CurvifyError for what can be seen to fail beforehand."""
     options = scheme_options(request.scheme, request.scheme_options)
+    check_trim(request)
     format = files.check_output(request.output, request.output_format, request.no_clobber)
     if request.ascii and format != "ply":
         raise OptionError(f"--ascii is for PLY; {format} has no such choice")
@@ -288,8 +314,9 @@ def _tell_prediction(run: Run, console: Console) -> None:
     request = run.request
     layout = run.written.layout(request.level, run.dtype)
     bytes_ = predicted_bytes(layout, run.format, request.ascii, run.triangulate)
+    most = " before trimming" if run.mask is not None else ""
     console.tell(f"{request.source}: {_sizes(run.surface.counts)}")
-    console.tell(f"{request.target} would have {_dense_sizes(run, layout)}, about {size(bytes_)}")
+    console.tell(f"{request.target} would have {_dense_sizes(run, layout)}, about {size(bytes_)}{most}")
 
 
 def _refine(run: Run, console: Console) -> None:
@@ -326,13 +353,7 @@ def _write(run: Run, recorder: Recorder | None, console: Console, backend: Backe
     stdout = files.CountedStdout()
     with (
         files.naming(request.target, FormatError),
-        dense_output(
-            request.output,
-            run.format,
-            ascii=request.ascii,
-            triangulate=run.triangulate,
-            stdout=stdout.as_file(),
-        ) as sink,
+        _output(run, stdout.as_file()) as sink,
         console.progress(request.target) as progress,
     ):
         if recorder is not None:
@@ -353,10 +374,20 @@ def _write(run: Run, recorder: Recorder | None, console: Console, backend: Backe
     return layout
 
 
+def _output(run: Run, stdout: BinaryIO) -> AbstractContextManager[Sink]:
+    """A sink that writes OUT, trimmed where that is asked for."""
+    if run.mask is not None:
+        return trimmed_output(run, run.mask, stdout)
+    request = run.request
+    return dense_output(request.output, run.format, ascii=request.ascii, triangulate=run.triangulate, stdout=stdout)
+
+
 def _sizes(counts: dict[str, int]) -> str:
     return f"{count_of(counts['vertices'], 'vertex', 'vertices')}, {count_of(counts['faces'], 'face')}"
 
 
 def _dense_sizes(run: Run, layout: DenseLayout) -> str:
+    if run.trimmed is not None:
+        return f"{count_of(run.trimmed[0], 'vertex', 'vertices')}, {count_of(run.trimmed[1], 'face')} after trimming"
     repeats = f" and {count_of(len(layout.repeats), 'repeat')} of them" if len(layout.repeats) else ""
     return f"{count_of(layout.vertex_count, 'vertex', 'vertices')}{repeats}, {count_of(run.faces, 'face')}"

@@ -61,9 +61,9 @@ class Asked:
 
     def mesh_options(self) -> MeshOptions:
         """What is done with the mesh before the surface is made. Raises OptionError for what does not fit."""
-        from curvify.schemes import load_scheme
+        from curvify.cli.run import scheme_options
 
-        options: MeshOptions = load_scheme(self.scheme).Options(**self.options)
+        options: MeshOptions = scheme_options(self.scheme, self.options)
         return options
 
     def surface(self, mesh: PolygonMesh) -> Surface:

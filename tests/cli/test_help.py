@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
 
 import click
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from curvify.cli.group import COMMANDS, Command, Option
 from opengl import device_or_skip
 
+DISC = Path(__file__).parents[2] / "sample_meshes" / "disc.png"
 FOUND = {name: import_module(f"curvify.cli.{name}").command for name in COMMANDS}
 EXAMPLES = [(name, line) for name, command in FOUND.items() for _, line in command.examples]
 
@@ -22,6 +24,7 @@ def test_examples_work_as_they_are_shown(call, shell, folder, name, line):
         (folder / place).parent.mkdir(parents=True, exist_ok=True)
         (folder / place).write_text((folder / "cube.obj").read_text())
     assert call("refine", "coarse.obj", "golden.ply").code == 0
+    (folder / "disc.png").write_bytes(DISC.read_bytes())
     assert f"  {line}\n" in call(name, "--help").out.decode()
     result = shell(line)
     assert (result.code, [text for text in result.err.splitlines() if "error" in text]) == (0, [])
