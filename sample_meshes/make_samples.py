@@ -306,6 +306,16 @@ BUILDERS: tuple[Callable[[], Sample], ...] = (
 """One function for each mesh, in the order in which they are written."""
 
 
+def write_disc(path: Path, size: int = 256, radius: float = 0.3) -> None:
+    """Write a trimming image: white, with a black disc of ``radius`` (of the width) whose rim is a few pixels soft."""
+    from PIL import Image
+
+    across = (np.arange(size) + 0.5) / size - 0.5
+    distance = np.hypot(across[:, None], across)
+    brightness = np.clip((distance - radius) * size / 4 + 0.5, 0.0, 1.0)
+    Image.fromarray(np.rint(255 * brightness).astype(np.uint8)).save(path, optimize=True)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Write every sample into the directory named on the command line."""
     parser = argparse.ArgumentParser(description="Write the sample meshes as OBJ files and their marks as JSON.")
@@ -329,6 +339,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         path = directory / f"{marked.name}.json"
         path.write_text(make_marks.json_text(marked), encoding="utf-8", newline="\n")
         print(f"{path.name}: for {marked.mesh}.obj, {marked.comment}")
+    write_disc(directory / "disc.png")
+    print("disc.png: an image to trim by")
 
 
 if __name__ == "__main__":

@@ -12,6 +12,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from curvify.mask import read_mask
+
 FOLDER = Path(__file__).resolve().parents[1] / "sample_meshes"
 SCRIPT = FOLDER / "make_samples.py"
 
@@ -110,9 +112,12 @@ def test_script_reproduces_the_committed_files(tmp_path: Path) -> None:
     run = subprocess.run([sys.executable, str(SCRIPT), str(target)], capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     made = {path.name: path.read_bytes() for path in target.iterdir()}
+    (tmp_path / "disc.png").write_bytes(made.pop("disc.png"))  # how tightly it is packed depends on the library
+    here, there = (read_mask(folder / "disc.png").values for folder in (tmp_path, FOLDER))
+    np.testing.assert_array_equal(here, there)
     assert set(made) == {f"{name}.obj" for name in EXPECTED} | {f"{name}.json" for name in MARKED}
     assert made == {path.name: path.read_bytes() for end in ("obj", "json") for path in FOLDER.glob(f"*.{end}")}
-    assert len(run.stdout.splitlines()) == len(EXPECTED) + len(MARKED)
+    assert len(run.stdout.splitlines()) == len(EXPECTED) + len(MARKED) + 1
 
 
 @each_sample
