@@ -5,6 +5,8 @@ The GPU's is imported only when it is asked for, or worth it.
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Protocol
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     from curvify.gpu.evaluate import GpuBackend
 
 NAMES = ("auto", "cpu", "gpu")
+#: What Linux has where there is a GPU: graphics drivers, NVIDIA's own, and that of Windows below it.
+DEVICE_FILES = ("/dev/dri", "/dev/nvidiactl", "/dev/dxg")
 #: Samples from which `auto` looks for a GPU: below, the CPU is done before a context is open.
 LARGE = 5_000_000
 
@@ -77,12 +81,21 @@ def open_backend(name: str, samples: int) -> Iterator[Backend]:
     """
     if name not in NAMES:
         raise OptionError(f"the backend must be one of {', '.join(NAMES)}, not {name!r}")
-    gpu = None if name == "cpu" or (name == "auto" and samples < LARGE) else _open_gpu(name == "gpu")
+    wanted = name == "gpu" or (name == "auto" and samples >= LARGE and hardware_possible())
+    gpu = _open_gpu(name == "gpu") if wanted else None
     if gpu is None:
         yield CpuBackend()
         return
     with gpu:
         yield gpu
+
+
+def hardware_possible() -> bool:
+    """Whether there can be a GPU: on Linux, whether there is a device file of one.
+
+    A look costs nothing, while to open OpenGL where it is software takes 60 MB and a tenth of a second.
+    """
+    return sys.platform != "linux" or any(os.access(file, os.F_OK) for file in DEVICE_FILES)
 
 
 def _open_gpu(asked: bool) -> GpuBackend | None:

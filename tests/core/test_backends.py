@@ -27,8 +27,17 @@ def test_small_work_looks_for_no_device(name, monkeypatch):
         assert backend.bytes_sent == 0
 
 
+def test_auto_opens_nothing_where_no_device_file_is(monkeypatch):
+    monkeypatch.setattr(backends.sys, "platform", "linux")
+    monkeypatch.setattr(backends, "DEVICE_FILES", ("/dev/no-such-device",))
+    monkeypatch.setattr(backends, "_open_gpu", lambda asked: pytest.fail("a device was looked for"))
+    with open_backend("auto", backends.LARGE) as backend:
+        assert isinstance(backend, CpuBackend)
+
+
 def test_auto_does_without_a_device_but_gpu_does_not(monkeypatch):
     monkeypatch.setenv("CURVIFY_GL", "none")
+    monkeypatch.setattr(backends, "hardware_possible", lambda: True)
     with open_backend("auto", backends.LARGE) as backend:
         assert isinstance(backend, CpuBackend)
     with pytest.raises(DeviceError, match="CURVIFY_GL"), open_backend("gpu", 1):
