@@ -110,6 +110,16 @@ def test_gltf_finds_its_buffers(tmp_path):
         curvify.read(path)
 
 
+def test_text_that_is_not_utf8(tmp_path):
+    text = (
+        "solid Stück\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+        "endloop\nendfacet\nendsolid Stück\n"
+    )
+    (tmp_path / "part.stl").write_bytes(text.encode("latin-1"))
+    mesh = curvify.read(tmp_path / "part.stl")
+    np.testing.assert_array_equal(mesh.positions[mesh.face_vertices], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+
+
 def test_unknown_suffixes_are_answered_with_the_known_ones(rich, tmp_path):
     for act, known in ((lambda p: curvify.write(rich, p), WRITE_FORMATS), (curvify.read, READ_FORMATS)):
         with pytest.raises(curvify.FormatError) as caught:
