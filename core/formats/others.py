@@ -59,7 +59,7 @@ def read_other(data: bytes, name: str, format: str) -> PolygonMesh:
     except Exception as error:
         raise FormatError(f"{name}: this cannot be read as {format}: {_one_line(error)}") from None
     if not parts:
-        raise FormatError(f"{name}: the file holds no triangles")
+        raise FormatError(f"{name}: {_why_empty(data, format)}")
     return _join(parts, name)
 
 
@@ -68,6 +68,15 @@ def _neighbors(name: str, format: str, trimesh: Any) -> dict[str, Any]:
     if format != "gltf" or not Path(name).is_file():
         return {}
     return {"resolver": trimesh.resolvers.FilePathResolver(name)}
+
+
+def _why_empty(data: bytes, format: str) -> str:
+    """What to say of a file without triangles. A binary STL of the wrong length is read as an empty text."""
+    count = int.from_bytes(data[80:84], "little")
+    due = 84 + 50 * count
+    if format == "stl" and len(data) >= 84 and b"facet" not in data and len(data) != due:
+        return f"a binary STL of {count} triangles has {due} bytes, this one {len(data)}; it is cut off or damaged"
+    return "the file holds no triangles"
 
 
 def _one_line(error: Exception) -> str:

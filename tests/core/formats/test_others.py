@@ -12,6 +12,7 @@ import pytest
 import curvify
 from bodies import boxes
 from curvify.checks import check_mesh
+from curvify.errors import FormatError
 from curvify.formats import READ_FORMATS, WRITE_FORMATS
 
 
@@ -118,6 +119,13 @@ def test_text_that_is_not_utf8(tmp_path):
     (tmp_path / "part.stl").write_bytes(text.encode("latin-1"))
     mesh = curvify.read(tmp_path / "part.stl")
     np.testing.assert_array_equal(mesh.positions[mesh.face_vertices], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+
+
+def test_a_binary_stl_that_is_cut_off(rich, tmp_path):
+    curvify.write(rich, tmp_path / "box.stl")
+    (tmp_path / "cut.stl").write_bytes((tmp_path / "box.stl").read_bytes()[:-60])
+    with pytest.raises(FormatError, match=r"cut.stl: a binary STL of 12 triangles has 684 bytes, this one 624;"):
+        curvify.read(tmp_path / "cut.stl")
 
 
 def test_unknown_suffixes_are_answered_with_the_known_ones(rich, tmp_path):
