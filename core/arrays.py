@@ -1,10 +1,17 @@
-"""Small array tools without a home of their own, in numpy alone."""
+"""Small array tools without a home of their own, in numpy alone.
+
+Preparing a mesh works on rows of vectors ``(n,3)`` that lie in memory component by component (`by_component`): steps
+then run over all rows, not over three numbers at a time, which is three to four times faster. Arithmetic keeps that
+order, and so do the tools here.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from curvify.mesh import Floats, Ints
+from curvify.mesh import Bools, Floats, Ints
 
 
 def distinct(keys: Ints) -> tuple[Ints, Ints]:
@@ -13,13 +20,27 @@ def distinct(keys: Ints) -> tuple[Ints, Ints]:
     What ``numpy.unique`` does with ``return_inverse``, without its import of masked arrays, which costs a short run
     a tenth of its time.
     """
-    order = np.argsort(keys, kind="stable")
+    order = ranking(keys)
     ordered = keys[order]
     fresh = np.ones(len(keys), dtype=bool)
     fresh[1:] = ordered[1:] != ordered[:-1]
     inverse = np.empty(len(keys), dtype=np.int64)
     inverse[order] = np.cumsum(fresh) - 1
     return ordered[fresh], inverse
+
+
+def ranking(keys: Ints) -> Ints:
+    """Stable order ``(n,)`` that sorts integers ``(n,)``.
+
+    Small ones are sorted with their places in the lowest bits: sorting numbers is several times faster than sorting
+    places by them.
+    """
+    bits = len(keys).bit_length()
+    if not len(keys) or keys.min() < 0 or int(keys.max()).bit_length() + bits > 63:
+        return np.argsort(keys, kind="stable")
+    packed = (keys.astype(np.int64) << bits) | np.arange(len(keys))
+    packed.sort()
+    return packed & ((1 << bits) - 1)
 
 
 def values_of(small: Ints) -> list[int]:
@@ -46,14 +67,32 @@ def unit_rows(vectors: Floats) -> Floats:
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
+def by_component(rows: Floats) -> Floats:
+    """Rows ``(n,c)`` in memory column by column."""
+    return np.asfortranarray(rows)
+
+
+def stacked(rows: Sequence[Floats]) -> Floats:
+    """Vectors ``(n,3)``, d for each of n things, as ``(n,d,3)``, in memory by component."""
+    result = np.empty((len(rows), 3, len(rows[0])))
+    for i, vectors in enumerate(rows):
+        result[i] = vectors.T
+    return result.transpose(2, 0, 1)
+
+
 def take_rows(rows: Floats, index: Ints) -> Floats:
-    """``rows[index]`` for ``rows (n,c)`` and indices ``(...)`` that are in range, in a quarter of its time."""
+    """``rows[index]`` for ``rows (n,c)`` and indices ``(...)`` that are in range, in a quarter of its time.
+
+    In memory the components come first if they do in ``rows``.
+    """
+    if rows.flags.f_contiguous and not rows.flags.c_contiguous:
+        return np.moveaxis(np.take(rows.T, index, axis=1, mode="clip"), 0, -1)
     return np.take(rows, index, axis=0, mode="clip")
 
 
-def gather(rows: Floats, index: Ints) -> Floats:
-    """``rows[index]`` for ``rows (n,c)`` and ``index (k,)`` in range, in memory column by column: steps run over k."""
-    return np.take(rows, index, axis=0, mode="clip").copy(order="F")
+def pick(first: Bools, a: Ints, b: Ints) -> Ints:
+    """``np.where(first, a, b)`` for indices, without its branches: half of those would be guessed wrong."""
+    return b + first * (a - b)
 
 
 def as_slice(rows: Ints) -> Ints | slice:

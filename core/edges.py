@@ -11,8 +11,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from curvify.mesh import Floats
-from curvify.normals import dot, perpendicular, unit
+from curvify.arrays import stacked
+from curvify.mesh import Bools, Floats
+from curvify.normals import dot, length, perpendicular, unit
 
 #: A tangent must advance along its edge by at least this cosine.
 LEAST_ADVANCE = 0.05
@@ -34,22 +35,30 @@ def bending_normals(chord: Floats, start_normal: Floats, end_normal: Floats, fac
     it, then the part across it of ``face_normal``, then any perpendicular.
     """
     along = unit(chord)
-
-    def across(vectors: Floats) -> Floats:
-        return vectors - dot(vectors, along) * along
-
     result = (start_normal + end_normal) / 2
-    candidates = (
-        unit(across(start_normal)) + unit(across(end_normal)),
-        across(face_normal),
-        perpendicular(along),
-    )
-    for candidate in candidates:
-        weak = np.linalg.norm(across(result), axis=-1) < 1e-9
-        if not weak.any():
-            break
-        result = np.where(weak[:, None], candidate, result)
+    weak = np.flatnonzero(_is_weak(result, along))
+    if len(weak):
+        result[weak] = _spare_bending(along[weak], start_normal[weak], end_normal[weak], face_normal[weak])
     return result
+
+
+def _spare_bending(along: Floats, start_normal: Floats, end_normal: Floats, face_normal: Floats) -> Floats:
+    """Bending normals ``(k,3)`` where the mean of the end normals vanishes or lies along the chord."""
+    result = unit(_across(start_normal, along)) + unit(_across(end_normal, along))
+    for candidate in (_across(face_normal, along), perpendicular(along)):
+        weak = _is_weak(result, along)
+        result[weak] = candidate[weak]
+    return result
+
+
+def _is_weak(vectors: Floats, along: Floats) -> Bools:
+    """Which vectors ``(E,3)`` have no part across unit ones."""
+    return length(_across(vectors, along)) < 1e-9
+
+
+def _across(vectors: Floats, along: Floats) -> Floats:
+    """The parts of vectors ``(E,3)`` across unit ones."""
+    return vectors - dot(vectors, along) * along
 
 
 def smooth_tangents(chord: Floats, normal: Floats, bending: Floats) -> Floats:
@@ -61,10 +70,12 @@ def smooth_tangents(chord: Floats, normal: Floats, bending: Floats) -> Floats:
     """
     along = unit(chord)
     tangent = unit(along * dot(normal, bending) - bending * dot(normal, along))
-    projected = along - dot(along, normal) * normal
-    flat = np.linalg.norm(projected, axis=-1, keepdims=True) < ALONG
-    fallback = np.where(flat, along, unit(projected))
-    return np.where(dot(tangent, along) <= LEAST_ADVANCE, fallback, tangent)
+    stuck = np.flatnonzero(dot(tangent, along)[:, 0] <= LEAST_ADVANCE)
+    if len(stuck):
+        projected = _across(along[stuck], normal[stuck])
+        flat = length(projected)[:, None] < ALONG
+        tangent[stuck] = np.where(flat, along[stuck], unit(projected))
+    return tangent
 
 
 def projected_tangents(chord: Floats, normal: Floats, bending: Floats) -> Floats:
@@ -74,17 +85,19 @@ def projected_tangents(chord: Floats, normal: Floats, bending: Floats) -> Floats
     along it. ``bending`` is not used.
     """
     along = unit(chord)
-    projected = along - dot(along, normal) * normal
-    flat = np.linalg.norm(projected, axis=-1, keepdims=True) <= NO_PROJECTION
-    return np.where(flat, along, unit(projected))
+    projected = _across(along, normal)
+    flat = length(projected) <= NO_PROJECTION
+    tangent = unit(projected)
+    tangent[flat] = along[flat]
+    return tangent
 
 
 def tangent_lengths(chord: Floats, tangent: Floats, rule: str) -> Floats:
     """Length ``(E,1)`` of the derivative at an edge end: ``chord``, or ``circle`` for the arc it approximates."""
-    length = np.sqrt(dot(chord, chord))
+    size = length(chord)[:, None]
     if rule == "chord":
-        return length
-    return 2 * length / (1 + dot(tangent, chord) / length)
+        return size
+    return 2 * size / (1 + dot(tangent, chord) / size)
 
 
 def edge_curves(start: Floats, end: Floats, start_tangent: Floats, end_tangent: Floats, rule: str) -> Floats:
@@ -92,7 +105,7 @@ def edge_curves(start: Floats, end: Floats, start_tangent: Floats, end_tangent: 
     chord = end - start
     first = start + tangent_lengths(chord, start_tangent, rule) * start_tangent / 3
     last = end - tangent_lengths(chord, end_tangent, rule) * end_tangent / 3
-    return np.stack([start, first, last, end], axis=1)
+    return stacked([start, first, last, end])
 
 
 def normal_fields(curves: Floats, start_normal: Floats, end_normal: Floats, bending: Floats) -> Floats:
@@ -104,22 +117,18 @@ def normal_fields(curves: Floats, start_normal: Floats, end_normal: Floats, bend
     """
     chord = curves[:, 3] - curves[:, 0]
     along = unit(chord)
-    a = start_normal - dot(start_normal, along) * along
-    b = end_normal - dot(end_normal, along) * along
+    a, b = _across(start_normal, along), _across(end_normal, along)
     replace = (dot(unit(a), unit(b)) < OPPOSITE) | (np.minimum(dot(a, a), dot(b, b)) < ALONG**2)
-    m0 = np.where(replace, bending, start_normal)
-    m1 = np.where(replace, bending, end_normal)
-    c0, c1, c2 = (3 * (curves[:, i + 1] - curves[:, i]) for i in range(3))
-
-    def field(derivative: Floats, normal: Floats) -> Floats:
-        return normal * dot(derivative, chord) - chord * dot(derivative, normal)
-
-    return np.stack(
+    m0, m1 = start_normal, end_normal
+    if replace.any():
+        m0, m1 = np.where(replace, bending, m0), np.where(replace, bending, m1)
+    steps = [3 * (curves[:, i + 1] - curves[:, i]) for i in range(3)]
+    (s0, s1, s2), (p0, p1, p2), (q0, q1, q2) = ([dot(step, v) for step in steps] for v in (chord, m0, m1))
+    return stacked(  # the product of C' with N, of C' x (N x e) = N (C'.e) - e (C'.N)
         [
-            field(c0, m0),
-            (field(c0, m1) + 2 * field(c1, m0)) / 3,
-            (2 * field(c1, m1) + field(c2, m0)) / 3,
-            field(c2, m1),
-        ],
-        axis=1,
+            m0 * s0 - chord * p0,
+            (m1 * s0 + m0 * (2 * s1) - chord * (q0 + 2 * p1)) / 3,
+            (m1 * (2 * s1) + m0 * s2 - chord * (2 * q1 + p2)) / 3,
+            m1 * s2 - chord * q2,
+        ]
     )

@@ -16,7 +16,6 @@ from curvify.backends import Backend
 from curvify.errors import OptionError
 from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.schemes.base import PatchClass, Patches
-from curvify.sectors import sides_of_edges
 from curvify.sinks import DenseLayout, Sink
 from curvify.threads import Job
 from curvify.weld import Numbering, cells_of, corner_colors, repeat_vertices
@@ -92,7 +91,7 @@ class _Evaluation:
         self.patches, self.numbering, self.layout, self.backend = patches, numbering, layout, backend
         self.tolerance = SERIES_TOLERANCE[layout.vertex_type["position"].base.name]
         self.colors = corner_colors(patches)
-        self.first_half_edges = sides_of_edges(patches.topology)[0]
+        self.first_half_edges = patches.topology.first
         outer = len(patches.topology.edges) - len(patches.inner_faces)
         self.inner_starts = numbering.edge_starts[outer:]
         self.outer = outer

@@ -20,10 +20,14 @@ FLAT_SHADED = 0.5
 
 def unit(vectors: Floats) -> Floats:
     """Vectors ``(...,3)`` scaled to length 1; those without length stay zero."""
-    square = np.einsum("...i,...i->...", vectors, vectors)
-    length = np.sqrt(square)
-    length[length == 0] = 1.0
-    return vectors / length[..., None]
+    size = length(vectors)
+    size[size == 0] = 1.0
+    return vectors / size[..., None]
+
+
+def length(vectors: Floats) -> Floats:
+    """Lengths ``(...)`` of vectors ``(...,3)``."""
+    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
 
 
 def dot(a: Floats, b: Floats) -> Floats:
@@ -40,7 +44,7 @@ def perpendicular(direction: Floats) -> Floats:
 def degrees_between(a: Floats, b: Floats) -> Floats:
     """Angle between vectors ``(...,3)`` in degrees, accurate for small angles too."""
     ua, ub = unit(a), unit(b)
-    return np.degrees(2 * np.arctan2(np.linalg.norm(ua - ub, axis=-1), np.linalg.norm(ua + ub, axis=-1)))
+    return np.degrees(2 * np.arctan2(length(ua - ub), length(ua + ub)))
 
 
 def corner_normals(
@@ -58,15 +62,16 @@ def corner_normals(
     ahead = take_rows(points, next_corners(offsets)) - points
     back = -take_rows(ahead, previous_corners(offsets))
     crosses = cross(ahead, back)
-    sine, cosine = np.linalg.norm(crosses, axis=1), np.einsum("ci,ci->c", ahead, back)
-    face_normals = np.repeat(unit(area), sizes, axis=0)
+    sine, cosine = length(crosses), np.einsum("ci,ci->c", ahead, back)
+    face_normals = take_rows(unit(area), np.repeat(np.arange(len(sizes)), sizes))
     reflex = np.einsum("ci,ci->c", crosses, face_normals) < 0
-    straight = sine <= 1e-12 * np.hypot(sine, cosine)
+    straight = sine <= 1e-12 * np.abs(cosine)
     angles = np.arctan2(sine, cosine)
     angles[reflex] = 2 * np.pi - angles[reflex]
-    length = np.where(reflex, -sine, sine)
-    length[straight] = 1.0
-    normals = crosses / length[:, None]
+    size = sine.copy()
+    size[reflex] *= -1.0
+    size[straight] = 1.0
+    normals = crosses / size[:, None]
     own = straight | np.repeat(sizes > 4 if flat is None else (sizes > 4) | flat, sizes)
     normals[own] = face_normals[own]
     return normals, angles
@@ -74,7 +79,7 @@ def corner_normals(
 
 def sum_by(labels: Ints, values: Floats, count: int) -> Floats:
     """Sum of the rows of ``values (n,3)`` that carry each label ``(count,3)``."""
-    return np.stack([np.bincount(labels, values[:, i], count) for i in range(3)], axis=1)
+    return np.stack([np.bincount(labels, values[:, i], count) for i in range(3)]).T
 
 
 def sector_normals(
@@ -88,13 +93,13 @@ def sector_normals(
     normals, angles = corner_normals(positions, offsets, vertices, area, flat)
     total = sum_by(sectors, normals * angles[:, None], len(vertices))
     vanishing: Bools = np.all(np.abs(total) < 1e-9, axis=1)
-    if vanishing[sectors].any():
+    if vanishing.any() and vanishing[sectors].any():
         of_corner = np.repeat(area, np.diff(offsets), axis=0)
         order = np.argsort(np.einsum("ci,ci->c", of_corner, of_corner), kind="stable")
         largest = np.zeros_like(total)
         largest[sectors[order]] = of_corner[order]
         total[vanishing] = largest[vanishing]
-    result = unit(total)[sectors]
+    result = take_rows(unit(total), sectors)
     lost = np.flatnonzero(~result.any(axis=1))
     if len(lost):
         result[lost] = _any_normals(positions, offsets, vertices, sectors, lost)

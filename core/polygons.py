@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from curvify.arrays import cross
+from curvify.arrays import cross, pick, take_rows
 from curvify.mesh import Bools, Floats, Ints
 
 REFLEX = 1e-3  # a corner whose sine is above minus this counts as convex
@@ -45,10 +45,23 @@ def previous_corners(face_offsets: Ints) -> Ints:
 
 def newell_normals(positions: Floats, face_offsets: Ints, face_vertices: Ints) -> Floats:
     """Area vector of each face ``(F,3)``: its length is twice the area. Faces without corners get zero."""
-    points = positions[face_vertices]
-    firsts = points[np.repeat(face_offsets[:-1], np.diff(face_offsets))]
-    points = points - firsts
-    return sum_over_faces(cross(points, points[next_corners(face_offsets)]), face_offsets)
+    sizes = np.diff(face_offsets)
+    if len(sizes) and sizes.min() >= 3 and sizes.max() <= 4:
+        return _diagonal_products(positions, face_offsets, face_vertices)
+    firsts = np.repeat(face_offsets[:-1], sizes)
+    points = take_rows(positions, face_vertices)
+    points = points - take_rows(points, firsts)
+    return sum_over_faces(cross(points, take_rows(points, next_corners(face_offsets))), face_offsets)
+
+
+def _diagonal_products(positions: Floats, face_offsets: Ints, face_vertices: Ints) -> Floats:
+    """Area vectors ``(F,3)`` of triangles and quads: the cross of the diagonals, a triangle being a quad whose last
+    corner is the first one again.
+    """
+    first, last = face_offsets[:-1], face_offsets[1:] - 1
+    last = pick(last - first == 3, last, first)
+    a, b, c, d = (take_rows(positions, face_vertices[corners]) for corners in (first, first + 1, first + 2, last))
+    return cross(c - a, d - b)
 
 
 def sum_over_faces(values: Floats, face_offsets: Ints) -> Floats:

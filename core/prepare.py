@@ -10,15 +10,16 @@ from functools import partial
 
 import numpy as np
 
+from curvify.arrays import by_component, take_rows
 from curvify.edges import Directions, edge_curves, smooth_tangents
 from curvify.errors import MeshError
 from curvify.marks import ResolvedMarks, explicit_marks, found_marks, gather_marks, hole_faces
 from curvify.mesh import Bools, Floats, Ints, Marks, PolygonMesh
-from curvify.normals import SAME_NORMAL, degrees_between, is_flat_shaded, unit
+from curvify.normals import SAME_NORMAL, degrees_between, is_flat_shaded, length, unit
 from curvify.options import MeshOptions
 from curvify.polygons import newell_normals
 from curvify.records import field, record
-from curvify.sectors import Features, end_normals, label_sectors, resolve_features, sides_of_edges
+from curvify.sectors import Features, end_normals, label_sectors, resolve_features
 from curvify.topology import (
     Loops,
     Topology,
@@ -108,7 +109,7 @@ class Coarse:
         if not features.corners.any() and not features.adjusted:
             return np.zeros(0, dtype=np.int64)
         topology, marks = self.topology, self.marks
-        one, other = (end_normals(topology, features.normals, sides) for sides in sides_of_edges(topology))
+        one, other = (end_normals(topology, features.normals, sides) for sides in (topology.first, topology.last))
         apart = topology.interior & (one != other).any(axis=(1, 2))
         asked = marks.crease.any(axis=1) | marks.corner[topology.edges].any(axis=1)
         return np.flatnonzero(apart & ~asked)
@@ -140,7 +141,7 @@ def prepare_mesh(mesh: PolygonMesh, options: MeshOptions | None = None) -> Coars
     """
     options = options or MeshOptions()
     mesh.validate()
-    positions = np.ascontiguousarray(mesh.positions, dtype=np.float64)
+    positions = by_component(mesh.positions.astype(np.float64, copy=False))
     _check_extent(positions, mesh)
     for marks in explicit_marks(mesh, options).values():
         marks.validate(mesh.vertex_count, mesh.face_count)
@@ -236,10 +237,10 @@ def _note_topology(coarse: Coarse, welded: int, dropped: Ints) -> None:
 def without_area(coarse: Coarse) -> Bools:
     """Faces ``(F,)`` whose area is nothing against the square of their longest side."""
     topology = coarse.topology
-    points = coarse.positions[topology.vertices]
-    sides = points[topology.next] - points
+    points = take_rows(coarse.positions, topology.vertices)
+    sides = take_rows(points, topology.next) - points
     longest = np.maximum.reduceat(np.einsum("ci,ci->c", sides, sides), topology.offsets[:-1])
-    return np.linalg.norm(coarse.area, axis=1) <= 1e-12 * longest
+    return length(coarse.area) <= 1e-12 * longest
 
 
 @record

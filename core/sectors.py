@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from curvify.arrays import cross, distinct, take_rows
+from curvify.arrays import cross, distinct, pick, take_rows
 from curvify.edges import ALONG, LEAST_ADVANCE, Directions, bending_normals, smooth_tangents
 from curvify.marks import ResolvedMarks
 from curvify.mesh import Bools, Floats, Ints
@@ -235,8 +235,9 @@ def _sharp_ends(topology: Topology, sectors: Ints) -> Bools:
     sharp = np.zeros((len(topology.edges), 2), dtype=bool)
     one = np.flatnonzero((topology.twin >= 0) & topology.forward)
     other = topology.twin[one]
-    sharp[topology.edge[one], 0] = sectors[one] != sectors[topology.next[other]]
-    sharp[topology.edge[one], 1] = sectors[topology.next[one]] != sectors[other]
+    edges = topology.edge[one]
+    sharp[edges, 0] = sectors[one] != sectors[topology.next[other]]
+    sharp[edges, 1] = sectors[topology.next[one]] != sectors[other]
     return sharp
 
 
@@ -279,15 +280,6 @@ def _line_tangents(topology: Topology, positions: Floats, sharp: Bools, straight
     return lines, turned
 
 
-def sides_of_edges(topology: Topology) -> tuple[Ints, Ints]:
-    """First and last half-edge of each edge ``(E,)``: the same one on a plain boundary."""
-    half_edges = np.arange(len(topology.edge))
-    first, last = (np.empty(len(topology.edges), dtype=np.int64) for _ in range(2))
-    first[topology.edge[::-1]] = half_edges[::-1]
-    last[topology.edge] = half_edges
-    return first, last
-
-
 def _end_tangents(
     topology: Topology,
     positions: Floats,
@@ -301,7 +293,7 @@ def _end_tangents(
 ) -> tuple[Floats, Floats]:
     """Unit tangents ``(E,2,3)`` and bending normals ``(E,3)`` of all edges."""
     chord = take_rows(positions, topology.edges[:, 1]) - take_rows(positions, topology.edges[:, 0])
-    first, last = sides_of_edges(topology)
+    first, last = topology.first, topology.last
     mean = end_normals(topology, normals, first)
     several = np.flatnonzero(sharp.any(axis=1) | topology.nonmanifold)
     one, other = mean[several], end_normals(topology, normals, last[several])
@@ -312,7 +304,8 @@ def _end_tangents(
     bent = np.flatnonzero(marks.edge_normals.any(axis=1))
     bending[bent] = _marked_bending(marks.edge_normals[bent], bending[bent], chord[bent])
     pointed, weight = _points(topology, sharp, marks.corner)
-    tangents = np.empty((len(chord), 2, 3))
+    tangents = np.empty((3, 2, len(chord))).transpose(2, 1, 0)
+    lined = lines.any(axis=1)
     for end in (0, 1):
         at = topology.edges[:, end]
         tangents[:, end] = directions(chord, mean[:, end], bending)
@@ -323,7 +316,7 @@ def _end_tangents(
         tangents[rows, end] = _crease_tangents(
             along, one[split, end], other[split, end], mean[rows, end], lines[at[rows]]
         )
-        rim = np.flatnonzero(~topology.interior & lines[at].any(axis=1))
+        rim = np.flatnonzero(~topology.interior & lined[at])
         line = lines[at[rim]]
         line *= np.where(dot(line, chord[rim]) < 0, -1.0, 1.0)
         tangents[rim, end] = unit(line - dot(line, mean[rim, end]) * mean[rim, end])
@@ -356,9 +349,11 @@ def _marked_bending(marked: Floats, own: Floats, chord: Floats) -> Floats:
 
 def end_normals(topology: Topology, normals: Floats, half_edges: Ints) -> Floats:
     """Normals ``(E,2,3)`` of the face of the given half-edges at the two ends in canonical direction."""
-    tail, head = take_rows(normals, half_edges), take_rows(normals, topology.next[half_edges])
-    forward = topology.forward[half_edges][:, None]
-    return np.stack([np.where(forward, tail, head), np.where(forward, head, tail)], axis=1)
+    tail, head, forward = half_edges, topology.next[half_edges], topology.forward[half_edges]
+    ends = np.empty((2, 3, len(half_edges)))
+    for end, corners in enumerate((pick(forward, tail, head), pick(forward, head, tail))):
+        ends[end] = take_rows(normals, corners).T
+    return ends.transpose(2, 0, 1)
 
 
 def _crease_tangents(along: Floats, left: Floats, right: Floats, mean: Floats, line: Floats) -> Floats:
@@ -385,21 +380,22 @@ def _fit_normals(
     At corner vertices that defines the normals. Elsewhere the tangents were made for the normals, except
     where no curve could serve all faces of an edge: those corners are counted.
     """
-    before = topology.prev
-    out = tangents[topology.edge, np.where(topology.forward, 0, 1)]
-    out = out * np.where(topology.forward, 1.0, -1.0)[:, None]
-    back = tangents[topology.edge[before], np.where(topology.forward[before], 1, 0)]
-    back = back * np.where(topology.forward[before], -1.0, 1.0)[:, None]
+    before, count, forward = topology.prev, len(tangents), topology.forward
+    rows = tangents.transpose(2, 1, 0).reshape(3, -1).T  # those at the starts of all edges, then those at their ends
+    leave, arrive = topology.edge + count * ~forward, (topology.edge + count * forward)[before]
+    out, back = take_rows(rows, leave), take_rows(rows, arrive)
     tilt = np.maximum(np.abs(dot(normals, out)), np.abs(dot(normals, back)))[:, 0]
     own = corners[topology.vertices]
     refit = own | (tilt > 1e-6)
     if not refit.any():
         return normals, 0
-    upright = cross(out[refit], back[refit])
+    out = out[refit] * np.where(forward[refit], 1.0, -1.0)[:, None]
+    back = back[refit] * np.where(forward[before[refit]], -1.0, 1.0)[:, None]
+    upright = cross(out, back)
     old = normals[refit]
-    flattened = old - dot(old, out[refit]) * out[refit]
+    flattened = old - dot(old, out) * out
     along = np.linalg.norm(flattened, axis=1, keepdims=True) < 1e-6
-    flattened = np.where(along, perpendicular(out[refit]), unit(flattened))
+    flattened = np.where(along, perpendicular(out), unit(flattened))
     collinear = np.linalg.norm(upright, axis=1, keepdims=True) < 1e-6
     fitted = unit(upright) * np.where(dot(upright, old) < 0, -1.0, 1.0)
     fitted = np.where(collinear, flattened, fitted)

@@ -9,7 +9,6 @@ from curvify.mesh import Floats, Ints
 from curvify.normals import sum_by, unit
 from curvify.records import record, replaced
 from curvify.schemes.base import Edges, Patches
-from curvify.sectors import sides_of_edges
 
 #: Normals whose cosine is below this have no mean worth the name.
 OPPOSITE = -0.99
@@ -42,7 +41,7 @@ def weld_normals(patches: Patches) -> Patches:
     opposite, as on the rim of a leaf, the first one stays.
     """
     topology = patches.topology
-    first, last = sides_of_edges(topology)
+    first, last = topology.first, topology.last
     fields = np.arange(len(topology.edges))
     others = patches.side_field[last]
     split = np.flatnonzero(patches.side_field[first] != others)

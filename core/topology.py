@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from curvify.arrays import distinct
+from curvify.arrays import distinct, pick, take_rows
 from curvify.mesh import Bools, Floats, Ints
 from curvify.polygons import newell_normals, next_corners, previous_corners
 from curvify.records import record
@@ -39,8 +39,9 @@ class Topology:
     position, so that two copies of an edge at one place get the same curve, bit for bit. Edges are ordered by
     (smaller id, larger id). Per corner ``(C,)``: ``next``, ``prev``; ``edge`` of its half-edge; ``forward``,
     whether that runs in the canonical direction; ``twin``, the opposite half-edge, -1 on a boundary.
-    Per edge ``(E,)``: ``uses``, the number of half-edges; ``interior``, whether they are two in opposite
-    directions. Every other edge is a boundary for each of its faces.
+    Per edge ``(E,)``: ``first`` and ``last``, its half-edges in the order of the corners, the same one on a plain
+    boundary; ``uses``, the number of half-edges; ``interior``, whether they are two in opposite directions. Every other
+    edge is a boundary for each of its faces.
     """
 
     offsets: Ints
@@ -52,6 +53,8 @@ class Topology:
     edge: Ints
     forward: Bools
     twin: Ints
+    first: Ints
+    last: Ints
     uses: Ints
     interior: Bools
 
@@ -110,7 +113,7 @@ def weld_vertices(positions: Floats, offsets: Ints, vertices: Ints, mode: str) -
         np.minimum.at(first, classes, np.arange(count))
         return first[classes]
     heads = vertices[next_corners(offsets)]
-    step = positions[vertices] - positions[heads]
+    step = take_rows(positions, vertices) - take_rows(positions, heads)
     short = (np.einsum("ci,ci->c", step, step) < NO_LENGTH) & (vertices != heads)
     links = [np.stack([vertices[short], heads[short]]), *_pinches(positions, offsets, vertices)]
     if mode == "auto":
@@ -122,9 +125,12 @@ def weld_vertices(positions: Floats, offsets: Ints, vertices: Ints, mode: str) -
 def _pinches(positions: Floats, offsets: Ints, vertices: Ints) -> list[Ints]:
     """Vertex pairs ``(2,k)`` at one place in one face: where an outline touches itself."""
     sizes = np.diff(offsets)
-    quads = vertices[offsets[:-1][sizes == 4][:, None] + np.arange(4)]
-    across = np.concatenate([quads[:, [0, 2]], quads[:, [1, 3]]])
-    pairs = [across[(positions[across[:, 0]] == positions[across[:, 1]]).all(axis=1)].T]
+    quads = offsets[:-1][sizes == 4]
+    pairs = []
+    for corners in (quads, quads + 1):
+        ends = vertices[corners], vertices[corners + 2]
+        touch = np.flatnonzero((take_rows(positions, ends[0]) == take_rows(positions, ends[1])).all(axis=1))
+        pairs.append(np.stack([ends[0][touch], ends[1][touch]]))
     corners = np.flatnonzero(np.repeat(sizes > 4, sizes))
     if len(corners):
         face = np.repeat(np.arange(len(sizes)), sizes)[corners]
@@ -195,23 +201,35 @@ def link_half_edges(positions: Floats, offsets: Ints, vertices: Ints, edges: Int
     uses = np.bincount(edge, minlength=len(edges))
     ups = np.bincount(edge[forward], minlength=len(edges))
     interior = (uses == 2) & (ups == 1)
-    order = np.argsort(edge[interior[edge]], kind="stable")
-    pairs = np.flatnonzero(interior[edge])[order].reshape(-1, 2)
+    first, last = _first_and_last(edge, len(edges))
     twin = np.full(len(vertices), -1)
-    twin[pairs[:, 0]], twin[pairs[:, 1]] = pairs[:, 1], pairs[:, 0]
+    one, other = first[interior], last[interior]
+    twin[one], twin[other] = other, one
     following, before = next_corners(offsets), previous_corners(offsets)
     return Topology(
-        offsets, vertices, len(positions), following, before, edges, edge, forward, twin, uses, interior
+        offsets, vertices, len(positions), following, before, edges, edge, forward, twin, first, last, uses, interior
     )
+
+
+def _first_and_last(edge: Ints, count: int) -> tuple[Ints, Ints]:
+    """First and last half-edge of each edge ``(E,)``."""
+    half_edges = np.arange(len(edge))
+    first, last = (np.empty(count, dtype=np.int64) for _ in range(2))
+    first[edge[::-1]] = half_edges[::-1]
+    last[edge] = half_edges
+    return first, last
 
 
 def canonical_direction(positions: Floats, edges: Ints) -> Ints:
     """The edges ``(E,2)`` turned so that each starts at its lexicographically smaller position, ties by id."""
     low, high = np.minimum(edges[:, 0], edges[:, 1]), np.maximum(edges[:, 0], edges[:, 1])
-    step = positions[high] - positions[low]
-    first = np.where(step[:, 0] != 0, step[:, 0], np.where(step[:, 1] != 0, step[:, 1], step[:, 2]))
+    step = take_rows(positions, high) - take_rows(positions, low)
+    first = step[:, 0].copy()
+    for i in (1, 2):
+        level = np.flatnonzero(first == 0)
+        first[level] = step[level, i]
     turn = first < 0
-    return np.stack([np.where(turn, high, low), np.where(turn, low, high)], axis=1)
+    return np.stack([pick(turn, high, low), pick(turn, low, high)]).T
 
 
 def is_closed(topology: Topology) -> bool:
@@ -227,9 +245,10 @@ def signed_volume(positions: Floats, offsets: Ints, vertices: Ints, area: Floats
     """
     if area is None:
         area = newell_normals(positions, offsets, vertices)
-    points = positions[vertices] - positions.mean(axis=0)
-    along = np.einsum("ci,ci->c", points, np.repeat(area / np.diff(offsets)[:, None], np.diff(offsets), axis=0))
-    return float(along.sum() / 6)
+    points = take_rows(positions - positions.mean(axis=0), vertices)
+    sizes = np.diff(offsets)
+    shares = take_rows(area / sizes[:, None], np.repeat(np.arange(len(sizes)), sizes))
+    return float(np.einsum("ci,ci->", points, shares) / 6)
 
 
 def fans(topology: Topology) -> Ints:

@@ -17,7 +17,6 @@ from curvify.mesh import Bools, Floats, Ints
 from curvify.records import record
 from curvify.sampling import Sampling, edge_abscissae, segments
 from curvify.schemes.base import Patches
-from curvify.sectors import sides_of_edges
 
 
 @record
@@ -200,7 +199,7 @@ def split_wedges(vertices: Ints, rows: Floats, own: Ints, count: int, total: int
 def _split_half_edges(patches: Patches, carried: Floats | None) -> Ints:
     """Half-edges whose normals or carried values differ from those of their edge's first half-edge, by edge."""
     topology = patches.topology
-    first, _ = sides_of_edges(topology)
+    first = topology.first
     lead = first[topology.edge]
     differs = patches.side_field != patches.side_field[lead]
     if carried is not None:

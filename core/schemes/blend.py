@@ -26,9 +26,9 @@ from curvify.schemes.blend_charts import CURVE, POINT, Charts, find_rings, make_
 from curvify.schemes.blend_fit import fit_paper_curves, fit_sectors, fit_smooth, soften
 from curvify.schemes.blend_lines import FeatureMarks, Lines, end_curves, find_lines, line_tangents, start_ends
 from curvify.schemes.blend_network import Network, blend_edges
-from curvify.schemes.patchwork import assemble_patches, piece_topology
+from curvify.schemes.frames import piece_topology
+from curvify.schemes.patchwork import assemble_patches
 from curvify.schemes.quads import Quads, edge_middles, face_centers, split_to_quads, whole_quads
-from curvify.sectors import sides_of_edges
 from curvify.topology import Topology, fans
 from curvify.words import count_of
 
@@ -80,7 +80,7 @@ def prepare(mesh: PolygonMesh, options: Options | None = None) -> Patches:
     coarse = prepare_mesh(mesh, options)
     work = build_surface(coarse, options)
     topology = work.topology
-    first, _ = sides_of_edges(topology)
+    first = topology.first
     side_field, half_edges = _sides(work, first)
     edges = blend_edges(work.network, topology, first, half_edges, work.curves, work.face_normals)
     normals = corner_normals(work)

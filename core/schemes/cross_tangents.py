@@ -78,6 +78,21 @@ def projection(normal: Floats, y: Floats, square: Floats) -> Floats:
     return _dots(normal, y) / np.maximum(square, SMALLEST)
 
 
+def start_share(kind: str, t: Floats) -> Floats:
+    """The share h(t) of the start in the blends ``precise`` and ``smooth``; h(t) + h(1-t) = 1."""
+    if kind == "precise":
+        return 1 - t
+    lam = SMOOTH_STEP
+    return (1 - t) * ((1 - lam) + lam * (1 - t) * (1 + 2 * t))
+
+
+def share_slope(kind: str, t: Floats) -> Floats:
+    """h'(t)."""
+    if kind == "precise":
+        return -np.ones_like(t)
+    return -(1 - SMOOTH_STEP) - 6 * SMOOTH_STEP * t * (1 - t)
+
+
 @record
 class ProjectedBlend:
     """T = f(t) (1 + K b(t)) Y, Y the part across n_c of h(t) T(0) + (1 - h(t)) T(1).
@@ -116,20 +131,9 @@ class ProjectedBlend:
         y *= factor
         return _abscissa_last(y), _abscissa_last(y_slope)
 
-    def towards(self, direction: Floats, t: Floats) -> Floats:
-        """Product ``(f,n,m)`` of T with vectors ``(3,f,n,m)`` across n_c, up to a positive factor.
-
-        The part along n_c that T lacks makes no difference, nor does its fullness.
-        """
-        h, _ = self._step(t)
-        start = np.einsum("cfnm,cfn->fnm", direction, self.sides.start)
-        start *= h
-        start += np.einsum("cfnm,cfn->fnm", direction, self.sides.end) * (1 - h)
-        return start
-
     def _blend(self, t: Floats) -> Floats:
         """Y ``(m,3,f,n)``."""
-        h = self._step(t)[0][:, None]
+        h = start_share(self.kind, t)[:, None]
         normal = _polynomials(self.sides.fields, bernstein_basis(3, t))
         y = self.sides.start * h
         y += self.sides.end * (1 - h)
@@ -139,18 +143,11 @@ class ProjectedBlend:
 
     def _blend_with_slope(self, t: Floats) -> tuple[Floats, Floats]:
         """Y and Y' ``(m,3,f,n)``."""
-        h, h_slope = (values[:, None] for values in self._step(t))
+        h, h_slope = (share(self.kind, t)[:, None] for share in (start_share, share_slope))
         start, end = self.sides.start, self.sides.end
         normal = _polynomials(self.sides.fields, bernstein_basis(3, t))
         normal_slope = _polynomials(self.sides.fields, bernstein_slopes(3, t))
         return project_with_slope(start * h + end * (1 - h), (start - end) * h_slope, normal, normal_slope)
-
-    def _step(self, t: Floats) -> tuple[Floats, Floats]:
-        """The share h of the start, and h'."""
-        if self.kind == "precise":
-            return 1 - t, -np.ones_like(t)
-        lam = SMOOTH_STEP
-        return (1 - t) * ((1 - lam) + lam * (1 - t) * (1 + 2 * t)), -(1 - lam) - 6 * lam * t * (1 - t)
 
     def _fullness(self, t: Floats) -> tuple[Floats, Floats]:
         """1 + K b and its derivative ``(m,f,n)``."""
@@ -240,10 +237,6 @@ class PaperTangent:
     def fields(self, t: Floats) -> Floats:
         """T at ``t``: ``(3,f,n,m)``."""
         return self.field_derivatives(t)[0]
-
-    def towards(self, direction: Floats, t: Floats) -> Floats:
-        """Product ``(f,n,m)`` of T with vectors ``(3,f,n,m)``."""
-        return dot(direction, self.fields(t))
 
     def field_derivatives(self, t: Floats) -> tuple[Floats, Floats]:
         """T and T' at ``t`` (equation 11 with the end corrections)."""

@@ -20,9 +20,10 @@ from curvify.prepare import prepare_mesh
 from curvify.records import record
 from curvify.sampling import kite_sampling
 from curvify.schemes.base import Basis, Form, PatchClass, Patches, bernstein
-from curvify.schemes.cross_tangents import PaperTangent, ProjectedBlend, Sides, dot
+from curvify.schemes.cross_tangents import PaperTangent, ProjectedBlend, Sides, dot, start_share
+from curvify.schemes.folds import blended_inward, build_patchwork, paper_inward
 from curvify.schemes.gregory_basis import center_row, edge_normal_basis, gregory_basis, side_speed
-from curvify.schemes.patchwork import FoldRule, Patchwork, build_patchwork
+from curvify.schemes.patchwork import Patchwork
 
 CROSS_TANGENTS = ("precise", "smooth", "linear", "quadratic")
 NORMALS = ("exact", "paper")
@@ -78,17 +79,20 @@ def prepare(mesh: PolygonMesh, options: Options | None = None) -> Patches:
     """Patches for every face of the mesh. Raises MeshError where there is nothing to refine."""
     options = options or Options()
     coarse = prepare_mesh(mesh, options)
-    blended = options.cross_tangent in ("precise", "smooth")
 
-    def inward(work: Patchwork, corners: Ints) -> CrossTangent:
+    def tangents_of(work: Patchwork, corners: Ints) -> PaperTangent:
         points, sides = patch_sides(work, corners)
-        if blended:  # their fullness does not change the side
-            return ProjectedBlend(sides, options.cross_tangent, np.zeros(corners.shape))
         patches = np.searchsorted(work.topology.offsets, corners[:, 0])
         alpha = face_shapes(work, options).alpha[patches]
         return paper_tangent(sides, points, side_normals(work, corners), options.cross_tangent, alpha)
 
-    work = build_patchwork(coarse, options.tangent_lengths, options.split_rule, FoldRule(inward, blended))
+    blended = options.cross_tangent in ("precise", "smooth")
+    inward = (
+        partial(blended_inward, partial(start_share, options.cross_tangent))
+        if blended
+        else partial(paper_inward, tangents_of)
+    )
+    work = build_patchwork(coarse, options.tangent_lengths, options.split_rule, inward)
     shape = face_shapes(work, options)
     used = {"precise": ("bulge",), "smooth": ("bulge",), "quadratic": ("alpha",)}.get(options.cross_tangent, ())
     work.warnings += coarse.unused_marks(used, f"gregory with {options.cross_tangent} cross tangents")

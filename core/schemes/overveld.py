@@ -18,10 +18,10 @@ from curvify.normals import degrees_between, dot, unit
 from curvify.options import MeshOptions
 from curvify.prepare import Coarse, prepare_mesh
 from curvify.records import field, record
+from curvify.schemes.frames import piece_topology
 from curvify.schemes.overveld_edges import EDGE_RULES, MIDPOINT_NORMALS
 from curvify.schemes.overveld_pass import Rules
 from curvify.schemes.overveld_polygons import Polygons
-from curvify.schemes.patchwork import piece_topology
 from curvify.topology import Topology
 from curvify.triangulation import triangulate_polygons
 from curvify.weld import split_wedges

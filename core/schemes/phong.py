@@ -15,7 +15,7 @@ from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.options import MeshOptions
 from curvify.prepare import prepare_mesh
 from curvify.schemes.base import Patches
-from curvify.schemes.patchwork import Frame
+from curvify.schemes.frames import Frame
 from curvify.schemes.triangles import (
     all_corners,
     block_form,

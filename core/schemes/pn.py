@@ -16,7 +16,8 @@ from curvify.options import MeshOptions
 from curvify.prepare import prepare_mesh
 from curvify.schemes.base import Patches
 from curvify.schemes.domain import jet_product
-from curvify.schemes.patchwork import Frame, Patchwork
+from curvify.schemes.frames import Frame
+from curvify.schemes.patchwork import Patchwork
 from curvify.schemes.triangles import (
     all_corners,
     block_form,

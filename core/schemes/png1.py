@@ -25,7 +25,8 @@ from curvify.prepare import Coarse, prepare_mesh
 from curvify.records import record
 from curvify.sampling import triangle_sampling
 from curvify.schemes.base import Form, PatchClass, Patches, bernstein_basis, bernstein_product, elevated
-from curvify.schemes.patchwork import Frame, Patchwork
+from curvify.schemes.frames import Frame
+from curvify.schemes.patchwork import Patchwork
 from curvify.schemes.png1_basis import png1_columns
 from curvify.schemes.triangles import (
     TrianglePieces,

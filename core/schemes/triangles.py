@@ -20,7 +20,8 @@ from curvify.records import record
 from curvify.sampling import domain_corners, triangle_sampling
 from curvify.schemes.base import Basis, Form, LinearControls, PatchClass, Patches, linear_basis
 from curvify.schemes.domain import jet_product
-from curvify.schemes.patchwork import Frame, Patchwork, edge_frame
+from curvify.schemes.frames import Frame, edge_frame
+from curvify.schemes.patchwork import Patchwork
 from curvify.sectors import Features
 from curvify.triangulation import triangulate_polygons
 from curvify.words import count_of
