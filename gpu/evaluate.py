@@ -17,11 +17,13 @@ import numpy.typing as npt
 from curvify import evaluate, tables
 from curvify.arrays import as_slice
 from curvify.errors import DeviceError
-from curvify.gpu.products import Products, Singles, Table, pack_columns
+from curvify.gpu.blend import BlendDevice
+from curvify.gpu.products import Products, Singles, Table, pack_columns, restored
 from curvify.gpu.programs import NORMALS, UNIT, VALUES, Kind
 from curvify.mesh import Bools, Floats, Ints
 from curvify.sampling import Sampling
 from curvify.schemes.base import BezierEdges, Edges, Form, KiteForms, PatchClass, Patches, bernstein_basis
+from curvify.schemes.blend_network import BlendEdges
 
 #: Numbers of Chebyshev points tried, fewest first.
 NODE_COUNTS = (8, 12, 16, 24, 32, 48)
@@ -56,9 +58,7 @@ class Vectors:
 
     def restore(self, values: Singles, dtype: np.dtype[Any]) -> Floats:
         """Points ``(f,S,3)`` in a type, from what was computed with the columns."""
-        points = values.astype(dtype) * dtype.type(self.scale)
-        points += self.origin[:, None].astype(dtype)
-        return points
+        return restored(values, self.origin, self.scale, dtype)
 
 
 class GpuBackend:
@@ -70,6 +70,7 @@ class GpuBackend:
         """Open a device; ``software`` allows one that is a program. Raises DeviceError where there is none."""
         self.products = Products()
         self.device = self.products.device
+        self.blend = BlendDevice(self.products)
         if not (software or self.device.hardware):
             self.close()
             raise DeviceError(f"{self.device.renderer} is no GPU")
@@ -96,19 +97,26 @@ class GpuBackend:
 
     def edges(self, edges: Edges, ids: Ints, fields: Ints, t: Floats) -> tuple[Floats, Floats]:
         """Positions and unit normals ``(3,e,m)`` at ``t (m,)`` on edges ``ids (e,)`` with normal fields ``(e,)``; those
-        that are no Bezier curves on the processor.
+        that are neither Bezier curves nor of blending surfaces on the processor.
         """
-        if not (len(t) and isinstance(edges, BezierEdges)):
+        if len(t) and isinstance(edges, BezierEdges):
+            positions, normals = self._bezier_edges(edges, ids, fields, t)
+        elif len(t) and isinstance(edges, BlendEdges):
+            positions, normals = self.blend.edges(edges, ids, fields, t)
+        else:
             return edges.points(ids, t), edges.normals(fields, t)
-        curves, lines = edges.curves[:, as_slice(ids)], edges.fields[:, as_slice(fields)]
-        vectors = Vectors.pack(curves, curves.shape[2])
-        positions = vectors.restore(self._bezier(VALUES, vectors, curves.shape[2], t), curves.dtype)
-        normals = self._bezier(UNIT, Vectors.pack(lines, 0), lines.shape[2], t)
         result = normals.astype(np.float64).transpose(2, 0, 1)
         lost = np.flatnonzero(_without_normal(normals))
         if len(lost):
             result[:, lost] = edges.normals(fields[lost], t)
         return positions.transpose(2, 0, 1), result
+
+    def _bezier_edges(self, edges: BezierEdges, ids: Ints, fields: Ints, t: Floats) -> tuple[Floats, Singles]:
+        """Positions and unit normals ``(e,m,3)``."""
+        curves, lines = edges.curves[:, as_slice(ids)], edges.fields[:, as_slice(fields)]
+        vectors = Vectors.pack(curves, curves.shape[2])
+        positions = vectors.restore(self._bezier(VALUES, vectors, curves.shape[2], t), curves.dtype)
+        return positions, self._bezier(UNIT, Vectors.pack(lines, 0), lines.shape[2], t)
 
     def _bezier(self, kind: Kind, vectors: Vectors, points: int, t: Floats) -> Singles:
         """Bezier polynomials of so many points at the abscissae of edges: ``(e,m,3)``."""
@@ -133,7 +141,8 @@ class GpuBackend:
         surface = patch_class.surface
         fill = partial(self._fill, rows=rows, points=sampling.points, grid=(patch_class.sides, level))
         if isinstance(surface, KiteForms):
-            left = self._fill_kites(surface, rows, sampling, level, positions, normals)
+            self.blend.fill(surface, rows, sampling, positions, normals)
+            left = np.zeros(len(rows), dtype=bool)
         elif patch_class.normals is None:
             left = fill(surface, NORMALS, positions=positions, normals=normals)
         else:
@@ -145,21 +154,6 @@ class GpuBackend:
             exact = np.empty((2, len(part), *positions.shape[1:]))
             evaluate.fill_patches(patches, patch_class, rows[part], sampling, level, tolerance, exact[0], exact[1])
             positions[part], normals[part] = exact
-
-    def _fill_kites(
-        self, surface: KiteForms, rows: Ints, sampling: Sampling, level: int, positions: Floats, normals: Floats
-    ) -> Bools:
-        """Write a surface of kites into ``positions`` and ``normals (f,S,3)``; which patches ``(f,)`` it left out."""
-        left = np.zeros(len(rows), dtype=bool)
-        for part, form, corners, first, points, grid in evaluate.kite_blocks(surface, rows, sampling, level):
-            if len(points):
-                values, directions = np.empty((2, len(part), len(points), 3), dtype=positions.dtype)
-                left[part] |= self._fill(
-                    form, NORMALS, rows=corners, points=points, grid=grid, positions=values, normals=directions
-                )
-                place = _place(part), slice(first, first + len(points))
-                positions[place], normals[place] = values, directions
-        return left
 
     def _fill(
         self,

@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -49,14 +49,26 @@ def pack_columns(*parts: Floats) -> tuple[Singles, float]:
     total = sum(part.shape[2] for part in parts)
     packed = np.zeros((parts[0].shape[1], 3, -(-total // 4) * 4), dtype=np.float32)
     largest = max(float(np.abs(part).max(initial=0.0)) for part in parts)
-    exponent = math.frexp(largest)[1] - 1 if 0 < largest < math.inf else 0
-    scale = 2.0 ** min(max(exponent, -126), 127)
+    scale = power_of_two(largest)
     begin = 0
     for part in parts:
         end = begin + part.shape[2]
         np.multiply(part.transpose(1, 0, 2), 1 / scale, out=packed[..., begin:end], casting="same_kind")
         begin = end
     return packed, scale
+
+
+def power_of_two(largest: float) -> float:
+    """The power of two to divide by so that numbers up to ``largest`` are below 2."""
+    exponent = math.frexp(largest)[1] - 1 if 0 < largest < math.inf else 0
+    return 2.0 ** min(max(exponent, -126), 127)
+
+
+def restored(values: Singles, origins: Floats, scale: float, dtype: np.dtype[Any]) -> Floats:
+    """Points ``(f,S,3)`` in a type, from those over ``scale`` and relative to ``origins (f,3)``."""
+    points = values.astype(dtype) * dtype.type(scale)
+    points += origins[:, None].astype(dtype)
+    return points
 
 
 def pack_table(matrix: Floats, samples: int) -> Singles:
@@ -94,17 +106,17 @@ class Products:
     @contextmanager
     def sent(self, columns: Singles, samples: int) -> Iterator[list[moderngl.Texture]]:
         """The columns ``(f,3,K)`` of some patches on the device, for tables of up to so many ``samples``."""
-        textures = self._run(self._send, columns, samples)
+        textures = self.run(self._send, columns, samples)
         try:
             yield textures
         finally:
-            self._run(self._release, textures)
+            self.run(self._release, textures)
 
     def multiply(self, kind: Kind, table: Table, controls: list[moderngl.Texture]) -> Singles:
         """Results ``(f,S,length)`` of a table and what was sent of some patches. Raises DeviceError."""
-        return self._run(self._multiply, kind, table, controls)
+        return self.run(self._multiply, kind, table, controls)
 
-    def _run(self, do: Callable[P, T], *args: P.args, **named: P.kwargs) -> T:
+    def run(self, do: Callable[P, T], *args: P.args, **named: P.kwargs) -> T:
         """Do something in the thread of the device, and wait for it."""
         import moderngl
 
@@ -116,10 +128,9 @@ class Products:
 
     def _send(self, columns: Singles, samples: int) -> list[moderngl.Texture]:
         """Textures of as many patches each as the device takes, with their results."""
-        room = min(MOST_RESULTS, self._limit("GL_MAX_SHADER_STORAGE_BLOCK_SIZE", MOST_RESULTS))
-        step = max(min(room // (samples * MOST_LENGTH * 4), self._limit("GL_MAX_TEXTURE_SIZE", 1024)), 1)
+        step = min(self.room(samples * MOST_LENGTH * 4), self.widest)
         parts = [columns[begin : begin + step] for begin in range(0, len(columns), step)]
-        return [self._texture(part.reshape(len(part), -1, 4)) for part in parts]
+        return [self.texture(part.reshape(len(part), -1, 4)) for part in parts]
 
     def _release(self, textures: list[moderngl.Texture]) -> None:
         for texture in textures:
@@ -135,7 +146,7 @@ class Products:
         for texture in controls:
             part = results[begin : begin + texture.height]
             begin += texture.height
-            buffer = self._buffer(part.nbytes)
+            buffer = self.buffer(part.nbytes)
             self._programs[kind].run(basis, texture, buffer, (*part.shape[:2], texture.width // 3))
             buffer.read_into(part, part.nbytes)
         return results
@@ -149,24 +160,33 @@ class Products:
                 old = self._tables.pop(next(iter(self._tables)))
                 self._table_bytes -= _texture_bytes(old)
                 old.release()
-            found = self._texture(packed)
+            found = self.texture(packed)
             self._table_bytes += packed.nbytes
         self._tables[table.key] = found
         return found
 
-    def _texture(self, texels: Singles) -> moderngl.Texture:
-        """A texture of ``texels (height, width, 4)``. Raises DeviceError where it is too large."""
-        height, width = texels.shape[:2]
-        most = self._limit("GL_MAX_TEXTURE_SIZE", 1024)
-        if max(height, width) > most:
+    @property
+    def widest(self) -> int:
+        """The longest side of a texture."""
+        return self._limit("GL_MAX_TEXTURE_SIZE", 1024)
+
+    def room(self, size: int) -> int:
+        """How many patches to evaluate at once whose results take ``size`` bytes each."""
+        return max(min(MOST_RESULTS, self._limit("GL_MAX_SHADER_STORAGE_BLOCK_SIZE", MOST_RESULTS)) // size, 1)
+
+    def texture(self, texels: npt.NDArray[Any]) -> moderngl.Texture:
+        """A texture of ``texels (height, width, c)``, numbers of 4 bytes. Raises DeviceError where it is too large."""
+        height, width, components = texels.shape
+        if max(height, width) > self.widest:
             raise DeviceError(
-                f"{self.device.renderer} takes tables up to {most}, this patch needs {max(height, width)}; "
+                f"{self.device.renderer} takes tables up to {self.widest}, this patch needs {max(height, width)}; "
                 "try --backend cpu"
             )
         self.bytes_sent += texels.nbytes
-        return self.device.ctx.texture((width, height), 4, np.ascontiguousarray(texels), dtype="f4")
+        kind = "f4" if texels.dtype == np.float32 else "i4"
+        return self.device.ctx.texture((width, height), components, np.ascontiguousarray(texels), dtype=kind)
 
-    def _buffer(self, size: int) -> moderngl.Buffer:
+    def buffer(self, size: int) -> moderngl.Buffer:
         """The buffer for results, made larger where it is too small."""
         if self._results is None or self._results.size < size:
             if self._results is not None:

@@ -82,5 +82,10 @@ class Program:
 def _source(kind: Kind, version: int, tile: tuple[int, int], entry: str) -> str:
     """GLSL of a program."""
     constants = {kind.name: 1, "ORDERS": kind.orders, "LENGTH": kind.length, "PATCHES": tile[0], "SAMPLES": tile[1]}
+    return read_shaders(version, constants, "evaluate", entry)
+
+
+def read_shaders(version: int, constants: dict[str, int], *names: str) -> str:
+    """GLSL of some sources, with constants defined."""
     lines = [f"#version {version} core", *(f"#define {name} {value}" for name, value in constants.items())]
-    return "\n".join([*lines, *((SHADERS / f"{name}.glsl").read_text() for name in ("evaluate", entry))])
+    return "\n".join([*lines, *((SHADERS / f"{name}.glsl").read_text() for name in names)])

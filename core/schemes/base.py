@@ -104,12 +104,14 @@ class KiteForms:
 
     ``forms``, and ``which (f,n)`` of them each kite of the patches has; ``corners (f,)`` the first corner of each
     patch in the topology. Forms live on the unit square, the patch's corner at (0, 0) and its side along the first
-    coordinate; their ``controls`` take corners of the topology.
+    coordinate; their ``controls`` take corners of the topology. ``network`` is what the forms were made from, for
+    backends that evaluate it without tables.
     """
 
     forms: list[Form]
     which: Ints
     corners: Ints
+    network: Any
 
 
 @record

@@ -46,7 +46,7 @@ class Network:
         keys = families.reshape(-1, 4) @ count ** np.arange(4)
         chosen, which = distinct(keys)
         forms = [self._form(tuple(int(key // count**i % count) for i in range(4))) for key in chosen]
-        return KiteForms(forms, which.reshape(families.shape[:2]), first)
+        return KiteForms(forms, which.reshape(families.shape[:2]), first, self)
 
     def _form(self, families: tuple[int, ...]) -> Form:
         exponents = tuple((float(a), float(b)) for a, b in self.charts.exponents[list(families)])
@@ -110,20 +110,25 @@ class BlendEdges:
             result[:, rows[:, None], columns] = first[0] + last[0]
         return result
 
+    def pieces(self, t: Floats) -> tuple[Ints, Floats]:
+        """The piece of an edge on which each ``t (...)`` lies, and where on it."""
+        count = self.ends.shape[1] // 2
+        which = np.minimum((t * count).astype(np.int64), count - 1)
+        return which, count * t - which
+
     def _pieces(self, count: int, t: Floats) -> list[tuple[int, Ints, Ints, Floats]]:
         """For each piece of the edges: its number, rows and columns of samples that lie in it, and where on it."""
-        pieces = self.ends.shape[1] // 2
-        which = np.minimum((t * pieces).astype(np.int64), pieces - 1)
+        which, x = self.pieces(t)
         found: list[tuple[int, Ints, Ints, Floats]] = []
-        for piece in range(pieces):
+        for piece in range(self.ends.shape[1] // 2):
             if t.ndim == 1:
                 rows, columns = np.arange(count), np.flatnonzero(which == piece)
-                x = pieces * t[columns] - piece
+                places = x[columns]
             else:
                 rows, columns = np.flatnonzero(which[:, 0] == piece), np.arange(1)
-                x = pieces * t[rows] - piece
+                places = x[rows]
             if len(rows) and len(columns):
-                found.append((piece, rows, columns, x))
+                found.append((piece, rows, columns, places))
         return found
 
     def _terms(self, ends: Ints, x: Floats) -> tuple[Floats, Floats]:
