@@ -10,6 +10,7 @@ from types import FrameType
 import pytest
 
 import curvify
+from curvify.schemes import folds
 from surfaces import flat_grid, noisy, torus
 
 CORE = str(Path(curvify.__file__).resolve().parent)
@@ -37,6 +38,16 @@ def test_building_a_surface_takes_calls_by_the_window_not_by_the_face() -> None:
     curvify.surface(few)
     small, large = calls_of(lambda: curvify.surface(few)), calls_of(lambda: curvify.surface(many))
     assert large - small < (1600 - 256) / 8
+
+
+def test_sides_that_surely_point_inward_are_not_sampled(monkeypatch: pytest.MonkeyPatch) -> None:
+    sampled: list[int] = []
+    look = folds._across_edges
+    monkeypatch.setattr(folds, "_across_edges", lambda *edges: sampled.append(0) or look(*edges))
+    curvify.surface(torus(24, 16))
+    assert not sampled
+    curvify.surface(noisy(torus(24, 16), 0.2))
+    assert sampled
 
 
 @pytest.mark.parametrize("triangles", [False, True])
