@@ -102,22 +102,33 @@ function listenToPointers(canvas, scene, state, unit, redraw) {
     const places = [...down.values()], [a, b = a] = places;
     return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, apart: Math.hypot(a.x - b.x, a.y - b.y) };
   };
+  // Shift and zoom so that what was under one place of the canvas comes under another.
+  const follow = (from, to, factor) => {
+    const { left, top, width, height } = canvas.getBoundingClientRect();
+    const lengths = ({ x, y }) => [(x - left - width / 2) / unit(), (top + height / 2 - y) / unit()];
+    const before = lengths(from);
+    zoomBy(state, factor);
+    const after = lengths(to);
+    state.pan = [0, 1].map((axis) => state.pan[axis] + after[axis] - before[axis]);
+  };
   canvas.addEventListener("pointerdown", (event) => {
-    canvas.setPointerCapture(event.pointerId);
     down.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    try {
+      canvas.setPointerCapture(event.pointerId);
+    } catch {
+      // The pointer has left already.
+    }
   });
   canvas.addEventListener("pointermove", (event) => {
     if (!down.has(event.pointerId)) return;
     const before = middle();
     down.set(event.pointerId, { x: event.clientX, y: event.clientY });
-    const now = middle(), x = now.x - before.x, y = now.y - before.y;
-    if (down.size > 1 || event.shiftKey || event.buttons > 1) {
-      state.pan = [state.pan[0] + x / unit(), state.pan[1] - y / unit()];
-      if (down.size === 2 && before.apart > 0) zoomBy(state, now.apart / before.apart);
-    } else turnBy(state, -TURN * x, TURN * y);
+    const now = middle(), two = down.size === 2 && before.apart > 0 && now.apart > 0;
+    if (down.size > 1 || event.shiftKey || event.buttons > 1) follow(before, now, two ? now.apart / before.apart : 1);
+    else turnBy(state, -TURN * (now.x - before.x), TURN * (now.y - before.y));
     redraw();
   });
-  for (const name of ["pointerup", "pointercancel"])
+  for (const name of ["pointerup", "pointercancel", "lostpointercapture"])
     canvas.addEventListener(name, (event) => down.delete(event.pointerId));
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   canvas.addEventListener("dblclick", () => redraw(resetView(scene, state)));

@@ -28,7 +28,64 @@ FRAMES = {
     "closer": "control=0&zoom=1.5",
     "values": "style=values&control=0",
     "parallel": "control=0&parallel=1",
+    "dragged": "control=0&gesture=drag",
+    "shifted": "control=0&parallel=1&gesture=shift",
+    "zoomed": "control=0&gesture=zoom",
+    "reset": "control=0&gesture=reset",
 }
+#: What pointers do on the canvas: places are apart from its middle. ``drag`` turns as in the frame "turned", and moves
+#: pointers that are up; ``shift`` moves the mesh by ``SHIFT`` with the key, with the right button, and with two fingers;
+#: ``zoom`` pinches to 3 and turns the wheel to 1.5. A page may have 16 contexts of WebGL: as many as there are frames.
+SHIFT = (36, -24)
+GESTURES = """<script type="module">
+const [dx, dy] = SHIFT;
+const canvas = document.getElementById("view"), middle = { x: innerWidth / 2, y: innerHeight / 2 };
+const send = (kind, id, x, y, more = {}) => canvas.dispatchEvent(new PointerEvent(kind, {
+  pointerId: id, clientX: middle.x + x, clientY: middle.y + y, buttons: 1, bubbles: true, cancelable: true, ...more }));
+const drag = (id, from, to, more) => {
+  send("pointerdown", id, ...from, more);
+  for (const share of [0.3, 0.6, 1])
+    send("pointermove", id, from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1]), more);
+  send("pointerup", id, ...to, { ...more, buttons: 0 });
+};
+const together = (starts, ends) => {
+  starts.forEach((place, id) => send("pointerdown", id + 10, ...place, { pointerType: "touch" }));
+  for (const share of [0.2, 0.5, 1])
+    starts.forEach(([x, y], id) => send("pointermove", id + 10, x + share * (ends[id][0] - x),
+      y + share * (ends[id][1] - y), { pointerType: "touch" }));
+  ends.forEach((place, id) => send("pointerup", id + 10, ...place, { pointerType: "touch", buttons: 0 }));
+};
+const gestures = {
+  drag: () => {
+    drag(1, [0, 0], [-25, 12.5]);
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
+      send("pointerdown", 1, 0, 0);
+      send(end, 1, 0, 0, { buttons: 0 });
+      send("pointermove", 1, 50, 50);
+    }
+  },
+  shift: () => {
+    drag(1, [0, 0], [0.5 * dx, 0], { shiftKey: true });
+    drag(1, [9, 9], [9 + 0.5 * dx, 9], { buttons: 2 });
+    together([[-40, 10], [50, -20]], [[-40, 10 + dy], [50, -20 + dy]]);
+  },
+  zoom: () => {
+    together([[-30, -15], [30, 15]], [[-90, -45], [90, 45]]);
+    canvas.dispatchEvent(new WheelEvent("wheel", { deltaY: Math.log(2) / 0.0015, cancelable: true }));
+  },
+  reset: () => {
+    gestures.drag();
+    gestures.shift();
+    gestures.zoom();
+    canvas.dispatchEvent(new MouseEvent("dblclick"));
+  },
+};
+const wait = setInterval(() => {
+  if (!document.getElementById("facts").textContent) return;
+  clearInterval(wait);
+  gestures[new URLSearchParams(location.hash.slice(1)).get("gesture")]();
+}, 20);
+</script></body>"""
 #: Two arrows to the right, one up, and no control mesh: as in the frame "turned".
 KEYS = ["ArrowRight", "ArrowRight", "ArrowUp", "c"]
 PRESS = """<script type="module">
@@ -55,7 +112,10 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
     page = Path(names[3]).read_text().replace('"style": "values"', '"style": "shaded"')
     (folder / "page.html").write_text(page)
     (folder / "pressed.html").write_text(page.replace("</body>", PRESS.replace("KEYS", str(KEYS))))
-    sources = [f"{'pressed' if name == 'pressed' else 'page'}.html#{state}" for name, state in FRAMES.items()]
+    (folder / "gestures.html").write_text(page.replace("</body>", GESTURES.replace("SHIFT", str(list(SHIFT)))))
+    pages = {name: "gestures" if "gesture=" in state else "page" for name, state in FRAMES.items()}
+    pages["pressed"] = "pressed"
+    sources = [f"{pages[name]}.html#{state}" for name, state in FRAMES.items()]
     shown = "".join(f'<iframe src="{source}"></iframe>' for source in sources)
     look = f"body{{margin:0;font-size:0}}iframe{{border:0;width:{WIDE}px;height:{HIGH}px}}"
     (folder / "all.html").write_text(f"<!DOCTYPE html><style>{look}</style><body>{shown}</body>")
@@ -131,6 +191,29 @@ def test_other_meshes_and_other_cameras(frames):
     assert (middle(frames["second"]) != middle(frames["plain"])).any(axis=2).mean() > 0.1
     assert covered(frames["closer"]) > 1.05 * covered(frames["plain"])
     assert (middle(frames["parallel"]) != middle(frames["plain"])).any()
+
+
+def near(frame: np.ndarray, expected: np.ndarray) -> bool:
+    """Whether nothing but some pixels at outlines differs."""
+    return bool((np.abs(middle(frame) - middle(expected)).max(axis=2) > 12).mean() < 0.002)
+
+
+def test_a_drag_turns_until_the_pointer_is_up(frames):
+    assert near(frames["dragged"], frames["turned"]) and not near(frames["dragged"], frames["plain"])
+
+
+def test_the_mesh_follows_a_drag_with_shift_or_the_right_button_and_two_fingers(frames):
+    x, y = SHIFT
+    assert near(frames["shifted"], np.roll(frames["parallel"], (y, x), axis=(0, 1)))
+    assert not near(frames["shifted"], frames["parallel"])
+
+
+def test_fingers_and_the_wheel_zoom(frames):
+    assert near(frames["zoomed"], frames["closer"])
+
+
+def test_a_double_click_goes_back(frames):
+    assert near(frames["reset"], frames["plain"])
 
 
 def test_to_a_file_and_through_a_pipe(process, folder):
