@@ -15,6 +15,7 @@ from curvify.formats.others import triangulate
 from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.nearest import double_areas, nearest_points, places_on, spread
 from curvify.normals import degrees_between
+from curvify.palette import to_shown, value_colors
 
 SAMPLES = 100_000
 
@@ -150,15 +151,7 @@ def deviations(mesh: PolygonMesh, reference: PolygonMesh, surface: bool = False)
     return nearest(mesh.positions, as_triangles(reference))[0]
 
 
-#: Colors of deviations from none to the largest: dark to light all along, so that they work in gray too.
-HEAT = np.array([(24, 16, 80), (70, 30, 140), (160, 40, 130), (225, 85, 75), (250, 160, 50), (255, 245, 170)])
-
-
 def heat_map(mesh: PolygonMesh, values: Floats, most: float) -> PolygonMesh:
     """The mesh with vertex colors that show ``values (V,)``, from 0 to ``most``; larger ones have the last color."""
-    place = np.clip(values / most if most > 0 else np.zeros_like(values), 0, 1) * (len(HEAT) - 1)
-    steps = np.arange(len(HEAT))
-    colors = np.stack([np.interp(place, steps, HEAT[:, channel]) for channel in range(3)], axis=1)
-    return mesh.with_(vertex_colors=np.rint(colors).astype(np.uint8))
-
-
+    shares = values / most if most > 0 else np.zeros_like(values)
+    return mesh.with_(vertex_colors=np.rint(255 * to_shown(value_colors(shares))).astype(np.uint8))

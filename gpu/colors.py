@@ -1,4 +1,4 @@
-"""Colors: names and numbers, what a screen shows and linear light, and the colors of values."""
+"""Colors by name or number, and pictures from light."""
 
 from __future__ import annotations
 
@@ -7,14 +7,10 @@ from numpy.typing import NDArray
 
 from curvify.errors import OptionError
 from curvify.mesh import Floats
+from curvify.palette import to_linear, to_shown
 
 Color = tuple[float, float, float]
 Image = NDArray[np.uint8]
-
-#: Colors of values from low to high, evenly apart: dark to light all along, so that they work in gray too.
-VALUE_COLORS = ("#20124d", "#2b2a80", "#1f4f9a", "#15759a", "#1f9a8a", "#4fb96c", "#95d04f", "#d8de55", "#fdf3a8")
-#: What has no value.
-NO_VALUE_COLOR = "#b0b0b0"
 
 
 def parse_color(text: str) -> Color:
@@ -29,18 +25,6 @@ def parse_color(text: str) -> Color:
     except ValueError:
         raise OptionError(f"unknown color '{text}'; give a name such as white, or #rrggbb") from None
     return red / 255, green / 255, blue / 255
-
-
-def to_linear(shown: Floats | Color) -> Floats:
-    """Linear light of what a screen shows, both 0 to 1 (IEC 61966-2-1, sRGB)."""
-    values = np.asarray(shown, dtype=np.float32)
-    return np.where(values > 0.04045, ((values + 0.055) / 1.055) ** 2.4, values / 12.92).astype(np.float32)
-
-
-def to_shown(light: Floats) -> Floats:
-    """What a screen shows for linear light, both 0 to 1."""
-    values = np.clip(light, 0.0, 1.0)
-    return np.where(values > 0.0031308, 1.055 * values ** (1 / 2.4) - 0.055, 12.92 * values).astype(np.float32)
 
 
 def to_bytes(image: Floats, background: Color | None) -> Image:

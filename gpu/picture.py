@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from curvify.gpu.colors import Color, Image, to_bytes, to_linear
+from curvify.gpu.colors import Color, Image, to_bytes
 from curvify.gpu.device import Device, open_device
 from curvify.gpu.render import draw_panels
 from curvify.gpu.scale import draw_bar
 from curvify.gpu.scene import Panel, Settings
+from curvify.palette import to_linear
 
 if TYPE_CHECKING:
     from PIL import ImageFont

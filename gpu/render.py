@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from curvify.gpu.camera import Camera
-from curvify.gpu.colors import NO_VALUE_COLOR, VALUE_COLORS, Image, parse_color, to_bytes, to_linear
+from curvify.gpu.colors import Image, to_bytes
 from curvify.gpu.device import Device
 from curvify.gpu.scene import Layer, Panel, Place, Settings, Stroke, place_panels
 from curvify.gpu.shapes import Shapes
 from curvify.gpu.triangles import Triangles
 from curvify.mesh import Floats
+from curvify.palette import NO_VALUE_COLOR, light_of, to_linear, value_stops
 
 if TYPE_CHECKING:
     import moderngl
@@ -104,8 +105,8 @@ class Painter:
             front_color=to_linear(settings.color),
             back_color=to_linear(settings.back),
             stripes=settings.stripes,
-            stops=np.stack([to_linear(parse_color(color)) for color in VALUE_COLORS]),
-            no_value_color=to_linear(parse_color(NO_VALUE_COLOR)),
+            stops=value_stops(),
+            no_value_color=light_of(NO_VALUE_COLOR),
         )
 
     def draw(self, layers: Sequence[Layer], place: Place, camera: Camera) -> Image:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from curvify.errors import OptionError
-from curvify.gpu.colors import VALUE_COLORS, Color, Image, parse_color, to_bytes, to_linear
+from curvify.gpu.colors import Color, Image, to_bytes
 from curvify.mesh import Floats
+from curvify.palette import to_linear, value_colors
 
 #: Numbers along the bar.
 TICKS = 5
@@ -89,7 +90,5 @@ def _placed(words: list[str], length: int, font: object) -> list[tuple[float, st
 
 def _ramp(length: int) -> Floats:
     """The colors from the first to the last ``(length,4)``, in linear light as the shader mixes them."""
-    stops = np.stack([to_linear(parse_color(color)) for color in VALUE_COLORS])
-    at = np.linspace(0, len(stops) - 1, length)
-    channels = [np.interp(at, np.arange(len(stops)), stops[:, channel]) for channel in range(3)]
-    return np.stack([*channels, np.ones(length)], axis=1).astype(np.float32)
+    light = value_colors(np.linspace(0, 1, length))
+    return np.append(light, np.ones((length, 1)), axis=1).astype(np.float32)

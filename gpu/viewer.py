@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from curvify.errors import MeshError, OptionError
-from curvify.gpu.colors import NO_VALUE_COLOR, VALUE_COLORS, parse_color, to_linear
 from curvify.gpu.render import shader_source, shares
 from curvify.gpu.scale import Scale, scale_of, texts
 from curvify.gpu.scene import Layer, Place, Settings, Stroke, place_panels
 from curvify.gpu.shapes import Shapes
+from curvify.palette import NO_VALUE_COLOR, VALUE_COLORS, light_of, to_linear, value_stops
 from curvify.words import count_of
 
 FOLDER = Path(__file__).parent / "viewer"
@@ -184,8 +184,8 @@ def _look(first: Layer, control: Layer | None, settings: Settings) -> dict[str, 
         "background": settings.background or (1.0, 1.0, 1.0),
         "front": to_linear(settings.color).tolist(),
         "back": to_linear(settings.back).tolist(),
-        "stops": [to_linear(parse_color(color)).tolist() for color in VALUE_COLORS],
-        "none": to_linear(parse_color(NO_VALUE_COLOR)).tolist(),
+        "stops": value_stops().tolist(),
+        "none": light_of(NO_VALUE_COLOR).tolist(),
         "stripes": settings.stripes,
         "lines": stroke(first.wire, PLAIN),
         "control_lines": stroke(control.wire if control else None, PLAIN),

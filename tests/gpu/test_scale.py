@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from curvify import OptionError, PolygonMesh
-from curvify.gpu.colors import VALUE_COLORS, parse_color
+from curvify.gpu.colors import parse_color
 from curvify.gpu.picture import picture
 from curvify.gpu.scale import Scale, draw_bar, scale_of, texts
 from curvify.gpu.scene import Layer, Panel, Settings
+from curvify.palette import VALUE_COLORS
 from opengl import device_or_skip
 
 WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
