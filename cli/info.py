@@ -13,6 +13,7 @@ from curvify.cli.surfaces import with_refine_options
 if TYPE_CHECKING:
     from curvify.cli.surfaces import Asked
     from curvify.mesh import PolygonMesh
+    from curvify.prepare import Coarse
 
 EXAMPLES = (
     ("What is in this file, and would refine complain?", "curvify info coarse.obj"),
@@ -41,13 +42,19 @@ def info_file(input: str, input_format: str | None, as_json: bool, quiet: bool, 
     """Read, look, print. Raises CurvifyError for a file that cannot be read."""
     from curvify.cli import files
     from curvify.cli.surfaces import asked_for
-    from curvify.inspection import describe
+    from curvify.errors import MeshError
+    from curvify.inspection import describe_prepared
+    from curvify.prepare import prepare_mesh
 
     files.check_input(input, input_format)
     mesh = files.read_input(input, input_format)
     name = files.shown_name(input, "stdin")
     asked = asked_for(refine_options)
-    answer = {"input": input, **describe(mesh, asked.mesh_options()), "refine": prediction(mesh, asked)}
+    try:
+        coarse = prepare_mesh(mesh, asked.mesh_options())
+    except MeshError:
+        coarse = None
+    answer = {"input": input, **describe_prepared(mesh, coarse), "refine": prediction(mesh, coarse, asked)}
     if as_json:
         options.print_json("info", answer)
     else:
@@ -56,7 +63,7 @@ def info_file(input: str, input_format: str | None, as_json: bool, quiet: bool, 
         click.echo(as_text(name, answer, quiet))
 
 
-def prediction(mesh: PolygonMesh, asked: Asked) -> dict[str, Any]:
+def prediction(mesh: PolygonMesh, coarse: Coarse | None, asked: Asked) -> dict[str, Any]:
     """What refine would do: counts and warnings, or the error that it would end with, or why it was not tried."""
     from curvify.errors import CurvifyError
 
@@ -64,7 +71,7 @@ def prediction(mesh: PolygonMesh, asked: Asked) -> dict[str, Any]:
     if mesh.face_count > MOST_FACES:
         return {**told, "not_tried": f"the mesh has more than {MOST_FACES:,} faces"}
     try:
-        made = asked.surface(mesh)
+        made = asked.surface(coarse or mesh)
     except CurvifyError as error:
         return {**told, "error": str(error)}
     split = {name: count for name, count in made.patches.counts.items() if name.endswith("_faces") and count}

@@ -13,6 +13,7 @@ from curvify.cli.group import Option
 if TYPE_CHECKING:
     from curvify.mesh import PolygonMesh
     from curvify.options import MeshOptions
+    from curvify.prepare import Coarse
     from curvify.refinement import Surface
 
 
@@ -66,8 +67,8 @@ class Asked:
         options: MeshOptions = scheme_options(self.scheme, self.options)
         return options
 
-    def surface(self, mesh: PolygonMesh) -> Surface:
-        """The surface over a mesh. Raises CurvifyError."""
+    def surface(self, mesh: PolygonMesh | Coarse) -> Surface:
+        """The surface over a mesh, prepared with ``mesh_options`` or not. Raises CurvifyError."""
         from curvify.refinement import surface
 
         return surface(mesh, self.scheme, **self.options)

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from curvify.arrays import distinct, values_of
+from curvify.arrays import distinct, take_rows, values_of
 from curvify.convex import REASONS, split_polygons
 from curvify.errors import MeshError
 from curvify.mesh import Bools, Floats, Ints, PolygonMesh
 from curvify.normals import degrees_between, unit
 from curvify.options import MeshOptions
-from curvify.prepare import Coarse, prepare_mesh, without_area
+from curvify.prepare import Coarse, prepare_mesh
 from curvify.topology import Loops, clean_loops, components, is_closed, signed_volume
 
 # --- edges ------------------------------------------------------------------------------------------------------
@@ -79,7 +79,7 @@ def degenerate_faces(coarse: Coarse) -> Ints:
     mesh = coarse.mesh
     bad = np.ones(mesh.face_count, dtype=bool)
     bad[clean_loops(mesh.face_offsets, coarse.stand_in[mesh.face_vertices]).source_faces] = False
-    bad[coarse.loops.source_faces[without_area(coarse)]] = True
+    bad[coarse.loops.source_faces[coarse.without_area]] = True
     return np.flatnonzero(bad)
 
 
@@ -118,11 +118,12 @@ def tilts(coarse: Coarse) -> Floats:
     The plane is across the area vector. 0 for triangles and for faces without area.
     """
     topology = coarse.topology
-    sides = unit(coarse.positions[topology.vertices[topology.next]] - coarse.positions[topology.vertices])
+    points = take_rows(coarse.positions, topology.vertices)
+    sides = unit(take_rows(points, topology.next) - points)
     normals = np.repeat(unit(coarse.area), topology.sizes, axis=0)
     sine = np.abs(np.einsum("ci,ci->c", sides, normals))
     tilt = np.degrees(np.arcsin(np.minimum(np.maximum.reduceat(sine, topology.offsets[:-1]), 1.0)))
-    tilt[(topology.sizes == 3) | without_area(coarse)] = 0.0
+    tilt[(topology.sizes == 3) | coarse.without_area] = 0.0
     return tilt
 
 
@@ -179,7 +180,7 @@ def volume(coarse: Coarse) -> float | None:
 
 def sharp_edges(coarse: Coarse) -> Bools:
     """Edges ``(E,)`` that are a crease at one end at least."""
-    sharp: Bools = np.any(coarse.features().sharp, axis=1)
+    sharp: Bools = np.logical_or(*coarse.features().sharp.T)
     return sharp
 
 
@@ -191,7 +192,7 @@ def bends(coarse: Coarse, sharp: Bools) -> tuple[Ints, Floats]:
     topology = coarse.topology
     one = np.flatnonzero(topology.twin > np.arange(len(topology.twin)))
     other = topology.twin[one]
-    flat = without_area(coarse)
+    flat = coarse.without_area
     faces = topology.faces
     kept = ~(flat[faces[one]] | flat[faces[other]] | sharp[topology.edge[one]])
     one, other = one[kept], other[kept]
@@ -207,9 +208,13 @@ def describe(mesh: PolygonMesh, options: MeshOptions | None = None) -> dict[str,
     Lengths are in units of the file, angles in degrees. ``shape`` is None for a mesh that no surface can be built on.
     """
     try:
-        coarse = prepare_mesh(mesh, options)
+        return describe_prepared(mesh, prepare_mesh(mesh, options))
     except MeshError:
-        coarse = None
+        return describe_prepared(mesh, None)
+
+
+def describe_prepared(mesh: PolygonMesh, coarse: Coarse | None) -> dict[str, Any]:
+    """As ``describe``, of a mesh that was prepared; None where it could not be."""
     return {
         "vertices": mesh.vertex_count,
         "faces": mesh.face_count,

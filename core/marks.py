@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from curvify.arrays import distinct
+from curvify.arrays import distinct, take_rows
 from curvify.mesh import Bools, Floats, Ints, Marks, PolygonMesh
 from curvify.normals import SAME_NORMAL, degrees_between
 from curvify.options import MeshOptions
@@ -271,12 +271,15 @@ def _normal_creases(topology: Topology, given: Floats) -> tuple[Floats, Bools]:
     a, b = corner_links(topology)
     one = np.flatnonzero(topology.twin > np.arange(len(topology.twin)))
     edges, start = topology.edge[one], np.where(topology.forward[one], 0, 1)
-    differ = degrees_between(given[a], given[b]) > SAME_NORMAL
+    left, right = take_rows(given, a), take_rows(given, b)
+    differ = (left[:, 0] != right[:, 0]) | (left[:, 1] != right[:, 1]) | (left[:, 2] != right[:, 2])
+    differ[differ] = degrees_between(left[differ], right[differ]) > SAME_NORMAL
     ends = np.zeros((len(topology.edges), 2))
     ends[edges, start] = differ[: len(one)]
     ends[edges, 1 - start] = differ[len(one) :]
     known = np.zeros(len(topology.edges), dtype=bool)
-    known[edges] = (given[a].any(axis=1) & given[b].any(axis=1)).reshape(2, -1).all(axis=0)
+    there: Bools = np.any(given, axis=1)
+    known[edges] = (there[a] & there[b]).reshape(2, -1).all(axis=0)
     return ends, known
 
 

@@ -16,6 +16,8 @@ from curvify.polygons import next_corners, previous_corners
 SAME_NORMAL = 0.1
 #: Corner normals closer than this to their face's are a flat-shaded export (degrees).
 FLAT_SHADED = 0.5
+#: Vectors that are compared before all of them.
+LOOK = 1 << 14
 
 
 def unit(vectors: Floats) -> Floats:
@@ -115,6 +117,11 @@ def _any_normals(positions: Floats, offsets: Ints, vertices: Ints, sectors: Ints
     return perpendicular(chosen[sectors[corners]])
 
 
+def _all_within(limit: float, a: Floats, b: Floats) -> bool:
+    """Whether no two vectors ``(n,3)`` are more than ``limit`` degrees apart; the first ones mostly tell already."""
+    return all(bool((degrees_between(a[rows], b[rows]) <= limit).all()) for rows in (slice(LOOK), slice(LOOK, None)))
+
+
 def is_flat_shaded(normals: Floats, offsets: Ints, area: Floats, links: tuple[Ints, Ints]) -> bool:
     """Whether given corner normals ``(C,3)`` only repeat the faces' own: a flat-shaded export.
 
@@ -124,11 +131,11 @@ def is_flat_shaded(normals: Floats, offsets: Ints, area: Floats, links: tuple[In
     """
     sizes = np.diff(offsets)
     first = np.repeat(normals[offsets[:-1]], sizes, axis=0)
-    if bool((degrees_between(normals, first) <= SAME_NORMAL).all()):
+    if _all_within(SAME_NORMAL, normals, first):
         return True
     own = np.repeat(area, sizes, axis=0)
     sized = own.any(axis=1)
-    if bool((degrees_between(normals[sized], own[sized]) > FLAT_SHADED).any()):
+    if not _all_within(FLAT_SHADED, normals[sized], own[sized]):
         return False
     a, b = links
     bent = degrees_between(own[a], own[b]) > SAME_NORMAL

@@ -6,7 +6,7 @@ met on the way.
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -67,8 +67,26 @@ class Coarse:
         """Normals and end tangents, with the vertices ``corners (V,)`` as corners besides those that are marked;
         ``directions`` as in ``resolve_features``.
         """
-        if corners is None:
+        if corners is None or not corners.any():
+            if directions is smooth_tangents:
+                return self._plain_features
             corners = np.zeros(len(self.positions), dtype=bool)
+        return self._features(corners, directions)
+
+    @cached_property
+    def _plain_features(self) -> Features:
+        return self._features(np.zeros(len(self.positions), dtype=bool), smooth_tangents)
+
+    @cached_property
+    def without_area(self) -> Bools:
+        """Faces ``(F,)`` whose area is nothing against the square of their longest side."""
+        topology = self.topology
+        points = take_rows(self.positions, topology.vertices)
+        sides = take_rows(points, topology.next) - points
+        longest = np.maximum.reduceat(np.einsum("ci,ci->c", sides, sides), topology.offsets[:-1])
+        return length(self.area) <= 1e-12 * longest
+
+    def _features(self, corners: Bools, directions: Directions) -> Features:
         return resolve_features(
             self.topology,
             self.positions,
@@ -134,11 +152,13 @@ class Coarse:
         return edge_curves(start, end, features.tangents[:, 0], features.tangents[:, 1], lengths)
 
 
-def prepare_mesh(mesh: PolygonMesh, options: MeshOptions | None = None) -> Coarse:
-    """Weld, clean and analyze a mesh, and weigh its marks.
+def prepare_mesh(mesh: PolygonMesh | Coarse, options: MeshOptions | None = None) -> Coarse:
+    """Weld, clean and analyze a mesh, and weigh its marks. A mesh that was prepared, with the same options, stays so.
 
     Raises MeshError where there is nothing to refine.
     """
+    if isinstance(mesh, Coarse):
+        return mesh
     options = options or MeshOptions()
     mesh.validate()
     positions = by_component(mesh.positions.astype(np.float64, copy=False))
@@ -222,7 +242,7 @@ def _note_topology(coarse: Coarse, welded: int, dropped: Ints) -> None:
             f"{count_of(counts['nonmanifold_edges'], 'edge')} with more than two faces or with faces that run the same "
             f"way, first: {a}-{b}; each face treats them as a boundary"
         )
-    flat = np.flatnonzero(without_area(coarse))
+    flat = np.flatnonzero(coarse.without_area)
     counts["zero_area_faces"] = len(flat)
     if len(flat):
         warnings.append(
@@ -232,15 +252,6 @@ def _note_topology(coarse: Coarse, welded: int, dropped: Ints) -> None:
     volume = partial(signed_volume, coarse.positions, loops.offsets, loops.vertices, coarse.area)
     if is_closed(topology) and volume() < 0:
         warnings.append("the mesh is closed and inside out: its faces run clockwise seen from outside")
-
-
-def without_area(coarse: Coarse) -> Bools:
-    """Faces ``(F,)`` whose area is nothing against the square of their longest side."""
-    topology = coarse.topology
-    points = take_rows(coarse.positions, topology.vertices)
-    sides = take_rows(points, topology.next) - points
-    longest = np.maximum.reduceat(np.einsum("ci,ci->c", sides, sides), topology.offsets[:-1])
-    return length(coarse.area) <= 1e-12 * longest
 
 
 @record

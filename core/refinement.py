@@ -30,6 +30,7 @@ from curvify.weld import cell_sources, number_dense_mesh, predict_faces
 
 if TYPE_CHECKING:
     from curvify.mask import Mask
+    from curvify.prepare import Coarse
 
 #: Faces that a dense mesh may have unless the caller allows more.
 MAX_FACES = 50_000_000
@@ -261,7 +262,7 @@ class Surface(Refinable):
         return layout, partial(dense_jobs, self.patches, numbering, layout)
 
 
-def surface(mesh: PolygonMesh, scheme: str = "gregory", **options: Any) -> Surface:
+def surface(mesh: PolygonMesh | Coarse, scheme: str = "gregory", **options: Any) -> Surface:
     """The surface of a scheme over a mesh; ``options`` are the scheme's.
 
     Raises OptionError for a recursive scheme, which has no surface, other CurvifyErrors as ``refinable``.
@@ -272,8 +273,11 @@ def surface(mesh: PolygonMesh, scheme: str = "gregory", **options: Any) -> Surfa
     return made
 
 
-def refinable(mesh: PolygonMesh, scheme: str = "gregory", **options: Any) -> Refinable:
-    """What a scheme makes of a mesh; ``options`` are the scheme's. Raises CurvifyError."""
+def refinable(mesh: PolygonMesh | Coarse, scheme: str = "gregory", **options: Any) -> Refinable:
+    """What a scheme makes of a mesh, prepared or not; ``options`` are the scheme's, and were those of the preparation.
+
+    Raises CurvifyError.
+    """
     module = load_scheme(scheme)
     try:
         chosen = module.Options(**options)

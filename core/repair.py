@@ -21,7 +21,7 @@ from curvify.mesh import Bools, Floats, Ints, Marks, PolygonMesh
 from curvify.normals import unit
 from curvify.options import MeshOptions
 from curvify.polygons import newell_normals
-from curvify.prepare import prepare_mesh, without_area
+from curvify.prepare import prepare_mesh
 from curvify.records import replaced
 from curvify.topology import Loops, Topology, build_topology, components, fans
 from curvify.words import count_of
@@ -71,7 +71,7 @@ def repair_mesh(mesh: PolygonMesh, weld: str = "auto", holes: int = 0) -> tuple[
     coarse = prepare_mesh(mesh, MeshOptions(weld=weld, sharp_from="none"))  # no marks: holes stay
     work = _Work(coarse.positions, np.arange(len(coarse.positions)), coarse.loops, np.zeros(len(coarse.area), bool))
     _note(work, mesh.face_count - len(coarse.area), "face with fewer than 3 distinct corners", "removed")
-    bad = without_area(coarse)
+    bad = coarse.without_area
     _note(work, int(bad.sum()), "face without area", "removed")
     work.keep(~bad)
     if not len(work.loops.source_faces):

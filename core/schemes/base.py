@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from math import comb
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.records import field, record
 from curvify.sampling import Sampling
 from curvify.topology import Topology
+
+if TYPE_CHECKING:
+    from curvify.prepare import Coarse
 
 
 @record
@@ -216,7 +219,7 @@ class Scheme(Protocol):
     continuity: str
     normals: tuple[str, ...]
 
-    def prepare(self, mesh: PolygonMesh, options: Any) -> Any:
+    def prepare(self, mesh: PolygonMesh | Coarse, options: Any) -> Any:
         """Patches of the whole mesh, or what a driver of the scheme's own takes; raises CurvifyError where the mesh
         cannot be used.
         """

@@ -74,7 +74,7 @@ class Options(MeshOptions):
                 raise OptionError(f"{name} must be one of {', '.join(map(str, choices))}, not {value!r}")
 
 
-def prepare(mesh: PolygonMesh, options: Options | None = None) -> Patches:
+def prepare(mesh: PolygonMesh | Coarse, options: Options | None = None) -> Patches:
     """Patches for every face of the mesh. Raises MeshError where there is nothing to refine."""
     options = options or Options()
     coarse = prepare_mesh(mesh, options)

@@ -16,7 +16,7 @@ from curvify.arrays import ahead, behind, cross, unit_rows
 from curvify.errors import OptionError
 from curvify.mesh import Bools, Floats, Ints, PolygonMesh
 from curvify.options import MeshOptions
-from curvify.prepare import prepare_mesh
+from curvify.prepare import Coarse, prepare_mesh
 from curvify.records import record
 from curvify.sampling import kite_sampling
 from curvify.schemes.base import Basis, Form, PatchClass, Patches, bernstein
@@ -75,7 +75,7 @@ class Options(MeshOptions):
         return "chord" if self.cross_tangent in ("linear", "quadratic") else "circle"
 
 
-def prepare(mesh: PolygonMesh, options: Options | None = None) -> Patches:
+def prepare(mesh: PolygonMesh | Coarse, options: Options | None = None) -> Patches:
     """Patches for every face of the mesh. Raises MeshError where there is nothing to refine."""
     options = options or Options()
     coarse = prepare_mesh(mesh, options)

@@ -99,7 +99,7 @@ class Recursion:
     marks: dict[str, dict[str, int]] = field(default_factory=dict)
 
 
-def prepare(mesh: PolygonMesh, options: Options | None = None) -> Recursion:
+def prepare(mesh: PolygonMesh | Coarse, options: Options | None = None) -> Recursion:
     """The polygons of the first pass. Raises MeshError where there is nothing to refine."""
     options = options or Options()
     coarse = prepare_mesh(mesh, options)
@@ -108,8 +108,8 @@ def prepare(mesh: PolygonMesh, options: Options | None = None) -> Recursion:
     split, fanned = triangulate_polygons(coarse.positions, loops.offsets, loops.vertices, concave_only=True)
     topology = piece_topology(coarse, split)
     corners = loops.source_corners[split.source_corners]
-    values = _corner_values(mesh, normals[split.source_corners] + 0.0, corners)
-    own = np.flatnonzero(mesh.face_vertices[corners] == topology.vertices)
+    values = _corner_values(coarse.mesh, normals[split.source_corners] + 0.0, corners)
+    own = np.flatnonzero(coarse.mesh.face_vertices[corners] == topology.vertices)
     wedges, base, repeated = split_wedges(topology.vertices, values, own, len(coarse.positions), len(coarse.positions))
     polygons = Polygons(
         coarse.positions,
@@ -121,7 +121,7 @@ def prepare(mesh: PolygonMesh, options: Options | None = None) -> Recursion:
         loops.source_faces[split.diagonal_faces],
     )
     cut = int((np.bincount(split.source_faces, minlength=len(loops.source_faces)) > 1).sum())
-    recursion = Recursion(polygons, options, coarse.topology, mesh, mesh.corner_uvs is not None)
+    recursion = Recursion(polygons, options, coarse.topology, coarse.mesh, coarse.mesh.corner_uvs is not None)
     recursion.counts = coarse.counts | {"concave_faces": cut}
     recursion.warnings = coarse.warnings + _notes(coarse, cut, fanned) + coarse.unused_marks((), name)
     recursion.marks = coarse.marks.counts

@@ -13,7 +13,7 @@ import numpy as np
 from curvify.errors import OptionError
 from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.options import MeshOptions
-from curvify.prepare import prepare_mesh
+from curvify.prepare import Coarse, prepare_mesh
 from curvify.schemes.base import Patches
 from curvify.schemes.frames import Frame
 from curvify.schemes.triangles import (
@@ -47,7 +47,7 @@ class Options(MeshOptions):
             raise OptionError(f"alpha of phong must be from 0 to 1, not {self.alpha}")
 
 
-def prepare(mesh: PolygonMesh, options: Options | None = None) -> Patches:
+def prepare(mesh: PolygonMesh | Coarse, options: Options | None = None) -> Patches:
     """Patches for every face of the mesh. Raises MeshError where there is nothing to refine."""
     options = options or Options()
     pieces = triangle_pieces(prepare_mesh(mesh, options))

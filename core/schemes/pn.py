@@ -13,7 +13,7 @@ import numpy as np
 from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.normals import dot, unit
 from curvify.options import MeshOptions
-from curvify.prepare import prepare_mesh
+from curvify.prepare import Coarse, prepare_mesh
 from curvify.schemes.base import Patches
 from curvify.schemes.domain import jet_product
 from curvify.schemes.frames import Frame
@@ -42,7 +42,7 @@ class Options(MeshOptions):
     """There are none but those of all schemes."""
 
 
-def prepare(mesh: PolygonMesh, options: Options | None = None) -> Patches:
+def prepare(mesh: PolygonMesh | Coarse, options: Options | None = None) -> Patches:
     """Patches for every face of the mesh. Raises MeshError where there is nothing to refine."""
     options = options or Options()
     pieces = triangle_pieces(prepare_mesh(mesh, options))

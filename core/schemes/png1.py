@@ -77,7 +77,7 @@ class Options(MeshOptions):
             raise OptionError(f"kappa must be a finite number, not {self.kappa}")
 
 
-def prepare(mesh: PolygonMesh, options: Options | None = None) -> Patches:
+def prepare(mesh: PolygonMesh | Coarse, options: Options | None = None) -> Patches:
     """Patches for every face of the mesh. Raises MeshError where there is nothing to refine."""
     options = options or Options()
     coarse = prepare_mesh(mesh, options)
