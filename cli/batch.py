@@ -53,7 +53,7 @@ NOT_FORWARDED = ("input_format", "output_format", "no_clobber", "report", "dry_r
         "Batch",
         "--dask",
         metavar="ADDRESS",
-        help="Work on a Dask cluster: the address of its scheduler, tcp://host:8786. Needs curvify[dask] there too, "
+        help="Work on a Dask cluster: the address of its scheduler, tcp://host:8786. Needs curvify with its extra dask there too, "
         "and the files under the same names.",
     ),
     options.option("Batch", "--report", metavar="FILE", help="Write what became of each file as JSON; '-' for stdout."),
@@ -131,13 +131,12 @@ def start(
     jobs: list[Job], count: int | None, dask: str | None, keep_going: bool
 ) -> Generator[tuple[int, Outcome], None, None]:
     """Outcomes from processes of this machine or from a cluster, with the threads that each job may use."""
-    from dataclasses import replace
-
+    from curvify.records import replaced
     from curvify.threads import processors
 
     def with_threads(number: int) -> list[Job]:
         given = jobs[0].values["threads"]
-        return [replace(job, values={**job.values, "threads": given or number}) for job in jobs]
+        return [replaced(job, values={**job.values, "threads": given or number}) for job in jobs]
 
     if dask is not None:
         from curvify.cli import batch_dask

@@ -41,7 +41,7 @@ def connect(address: str) -> tuple[Any, Any]:
     try:
         from distributed import Client, as_completed
     except ImportError:
-        raise OptionError("--dask needs Dask: pip install 'curvify[dask]'") from None
+        raise OptionError("--dask needs Dask: pip install 'distributed>=2024.1'") from None
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
         client: Any = Client

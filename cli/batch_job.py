@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass, replace
 from hashlib import blake2b
 from pathlib import Path
 from typing import Any
@@ -19,13 +18,14 @@ from curvify.cli.main import text_of
 from curvify.cli.surfaces import refine_parameters
 from curvify.formats.files import atomic_file
 from curvify.formats.references import referenced_files
+from curvify.records import record, replaced
 
 #: Options that change how a file is made but not one byte of it.
 WITHOUT_EFFECT = ("input", "output", "threads", "max_faces", "quiet", "verbose", "dry_run", "no_clobber", "report")
 DONE, SKIPPED, FAILED, NOT_RUN = "done", "skipped", "failed", "not run"
 
 
-@dataclass(frozen=True)
+@record
 class Job:
     """A file to refine: ``values`` are the arguments of refine, ``stamp`` the path of the output's stamp."""
 
@@ -43,10 +43,10 @@ class Job:
         """The same job for a process in another folder."""
         files = {name: str(Path(path).resolve()) for name, path in named_files(self.values).items()}
         ends = {name: str(Path(self.values[name]).resolve()) for name in ("input", "output")}
-        return replace(self, values={**self.values, **files, **ends}, stamp=str(Path(self.stamp).resolve()))
+        return replaced(self, values={**self.values, **files, **ends}, stamp=str(Path(self.stamp).resolve()))
 
 
-@dataclass(frozen=True)
+@record
 class Outcome:
     """What became of a job. ``faces`` and ``bytes`` are of the output; ``seconds`` those of the whole job."""
 
@@ -65,7 +65,7 @@ def do(job: Job) -> Outcome:
         outcome = _do(job)
     except Exception as error:
         outcome = Outcome(FAILED, error=" ".join(text_of(error)[0].split()))
-    return replace(outcome, seconds=time.perf_counter() - start)
+    return replaced(outcome, seconds=time.perf_counter() - start)
 
 
 def _do(job: Job) -> Outcome:
@@ -114,7 +114,7 @@ def file_hash(path: str) -> str:
 def is_done(job: Job, key: str) -> bool:
     """Whether the output is there, as made from the same."""
     try:
-        stamp = json.loads(Path(job.stamp).read_text())
+        stamp = json.loads(Path(job.stamp).read_text(encoding="utf-8"))
         return bool(stamp["key"] == key and stamp["output"] == file_hash(job.output) != "none")
     except (OSError, ValueError, KeyError, TypeError):
         return False

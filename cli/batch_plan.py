@@ -10,7 +10,7 @@ from typing import Any
 
 from curvify.cli.batch_job import Job
 from curvify.errors import OptionError
-from curvify.formats import READ_FORMATS, WRITE_FORMATS, find_format
+from curvify.formats import READ_FORMATS, WRITE_FORMATS
 from curvify.formats.files import remove_leftovers
 
 #: Folder of the stamps in the output folder.
@@ -26,7 +26,10 @@ def plan(
     the folder. Raises OptionError for patterns that fit nothing and for two files that would go to one place.
     """
     suffix = suffix if suffix.startswith(".") else f".{suffix}"
-    find_format(f"name{suffix}", None, WRITE_FORMATS)
+    if suffix[1:].lower() not in WRITE_FORMATS:
+        raise OptionError(f"--suffix {suffix}: that is no format to write; choose from {', '.join(WRITE_FORMATS)}")
+    if Path(folder).exists() and not Path(folder).is_dir():
+        raise OptionError(f"--output-dir {folder}: that is a file; give a folder, which is made where there is none")
     found, unknown = find_inputs(patterns, folder)
     jobs: dict[str, Job] = {}
     inputs = {os.path.realpath(path) for path in found}
@@ -54,6 +57,8 @@ def find_inputs(patterns: Iterable[str], folder: str) -> tuple[dict[str, str], l
     if plain:
         base = os.path.commonpath([Path(path).absolute().parent for path in plain])
         found.update((path, base) for path in plain)
+    for path in filter(os.path.isdir, plain):
+        raise OptionError(f"{path} is a folder; give a pattern in quotes, such as '{path.rstrip(os.sep)}/**/*.obj'")
     for pattern in (pattern for pattern in patterns if glob.has_magic(pattern)):
         fitting = [path for path in glob.glob(pattern, recursive=True) if Path(path).is_file()]  # noqa: PTH207
         paths = [path for path in fitting if not os.path.realpath(path).startswith(own)]

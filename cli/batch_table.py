@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
 from curvify import __version__
@@ -45,7 +44,7 @@ def summary(made: list[Outcome]) -> str:
 def write_batch_report(path: str, jobs: list[Job], made: list[Outcome]) -> None:
     """What became of each file, as JSON; what is the same for all comes once."""
     files: list[dict[str, Any]] = [
-        {"input": job.name, "output": job.output, **asdict(outcome)} for job, outcome in zip(jobs, made, strict=True)
+        {"input": job.name, "output": job.output, **vars(outcome)} for job, outcome in zip(jobs, made, strict=True)
     ]
     options = {name: value for name, value in jobs[0].values.items() if name not in ("input", "output")}
     report = {"schema": 1, "curvify": __version__, "command": "batch", "options": options, "files": files}

@@ -18,7 +18,6 @@ EXAMPLES = (
     ),
 )
 CONDITION = "Conditions"
-DEGREES = click.FloatRange(min=0, max=180)
 
 
 def condition(name: str, help: str, type: Any = None, metavar: str | None = None) -> Any:
@@ -39,12 +38,17 @@ def condition(name: str, help: str, type: Any = None, metavar: str | None = None
     condition("--no-duplicates", "No two faces have the same vertices."),
     condition("--no-unused", "Every vertex is in a face."),
     condition("--convex", "No face is concave or touches itself: nothing that 'curvify split' would cut for that."),
-    condition("--planar", "No side of a face leaves the face's plane by more than this many degrees.", DEGREES, "DEG"),
+    condition(
+        "--planar",
+        "No side of a face leaves the face's plane by more than this many degrees.",
+        options.DEGREES,
+        "DEG",
+    ),
     condition(
         "--g1",
         "No two faces meet at more than this angle, in degrees, across an edge that is not a crease. In a dense mesh "
         "of a smooth surface, twice the level halves these angles; kinks stay.",
-        DEGREES,
+        options.DEGREES,
         "DEG",
     ),
     condition("--max-sides", "No face has more sides.", options.POSITIVE, "N"),
@@ -78,9 +82,7 @@ def check_file(
     from curvify.cli.console import as_line
     from curvify.errors import MeshError
 
-    files.check_input(input, input_format)
-    mesh = files.read_input(input, input_format)
-    name = files.shown_name(input, "stdin")
+    mesh, name = files.open_input(input, input_format)
     with files.naming(name, MeshError):
         findings = check_mesh(mesh, asked, weld or "auto")
     passed = all(finding.passed for finding in findings)

@@ -47,8 +47,8 @@ class Length(click.ParamType):  # type: ignore[type-arg,unused-ignore]
 
 
 @click.command(name="compare", cls=Command, examples=EXAMPLES, short_help=COMMANDS["compare"])
-@click.argument("a", metavar="A", type=click.Path(allow_dash=True))
-@click.argument("b", metavar="B", type=click.Path(allow_dash=True))
+@click.argument("a", metavar="A", type=options.FILE)
+@click.argument("b", metavar="B", type=options.FILE)
 @options.with_options(
     options.option(
         "Tolerances",
@@ -61,7 +61,7 @@ class Length(click.ParamType):  # type: ignore[type-arg,unused-ignore]
     options.option(
         "Tolerances",
         "--normal-tolerance",
-        type=click.FloatRange(min=0, max=180),
+        type=options.Number(min=0, max=180),
         metavar="DEG",
         help="How far normals may be apart.  [default: 0.1 with --tolerance]",
     ),
@@ -140,17 +140,12 @@ def compare_files(
 
 def _read(path: str, format: str | None) -> PolygonMesh:
     """A mesh with a surface; ``format`` counts where the suffix does not tell."""
-    from pathlib import Path
-
     from curvify.cli import files
     from curvify.errors import MeshError
-    from curvify.formats import READ_FORMATS
 
-    told = path != files.STREAM and Path(path).suffix.lower().removeprefix(".") in READ_FORMATS
-    files.check_input(path, None if told else format)
-    mesh = files.read_input(path, None if told else format)
+    mesh, name = files.open_input(path, files.format_of(path, format))
     if not mesh.face_count:
-        raise MeshError(f"{files.shown_name(path, 'stdin')}: the mesh has no faces; give a mesh with polygons")
+        raise MeshError(f"{name}: the mesh has no faces; give a mesh with polygons")
     return mesh
 
 
@@ -200,7 +195,7 @@ def write_heatmap(path: str, a: PolygonMesh, b: PolygonMesh, surface: bool) -> d
 
 def draw_heatmap(path: str, mesh: PolygonMesh, values: Floats, most: float) -> None:
     """Write a picture of the mesh from two opposite sides, colored by its distances ``(V,)``, with their scale."""
-    from curvify.cli import pictures
+    from curvify.cli import files
     from curvify.gpu.picture import picture, to_png
     from curvify.gpu.scale import Scale
     from curvify.gpu.scene import Layer, Panel, Settings
@@ -209,7 +204,7 @@ def draw_heatmap(path: str, mesh: PolygonMesh, values: Floats, most: float) -> N
     views = (azimuth, elevation), (azimuth + 180, -elevation)
     panels = [Panel([Layer(mesh, "values", values=values)], view=view) for view in views]
     settings = Settings(size=(600, 500), scale=Scale(0.0, most, "distance, units of the file"))
-    pictures.write(to_png(picture(panels, settings)), path)
+    files.write_bytes(to_png(picture(panels, settings)), path)
 
 
 def _lines(name: str, answer: dict[str, Any]) -> list[str]:

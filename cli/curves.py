@@ -69,17 +69,13 @@ def curves_file(
     from curvify.cli.console import Console
     from curvify.cli.surfaces import asked_for
     from curvify.curves import chained, curves
-    from curvify.errors import FormatError, MeshError
+    from curvify.errors import MeshError
     from curvify.words import count_of
 
     console = Console(quiet, verbose)
-    if output != files.STREAM:
-        files.check_output(output, None, no_clobber)
-        if not output.lower().endswith(".obj"):
-            raise FormatError(f"{output}: curves are written as OBJ only; give a name that ends in .obj")
-    files.check_input(input, input_format)
-    mesh = files.read_input(input, input_format)
-    name = files.shown_name(input, "stdin")
+    files.check_target(output, no_clobber)
+    files.check_suffix(output, ".obj", "curves are written as OBJ only")
+    mesh, name = files.open_input(input, input_format)
     asked = asked_for(refine_options)
     with files.naming(name, MeshError):
         made = asked.surface(mesh)
@@ -90,17 +86,13 @@ def curves_file(
     kinds = [kind for kind, wanted in choice.items() if wanted] or ["edges", "silhouette"]
     found = {kind: curves(dense, kind, view) for kind in kinds}
     lines = {kind: segments.ends.tolist() if kind == "cells" else chained(segments) for kind, segments in found.items()}
-    write_lines(output, found, lines)
+    files.write_bytes(lines_text(found, lines).encode(), output)
     told = ", ".join(f"{count_of(len(lines[kind]), 'line')} of {kind}" for kind in kinds)
     console.explain(f"{files.shown_name(output, 'stdout')}: {told}")
 
 
-def write_lines(path: str, found: dict[str, Segments], lines: dict[str, list[list[int]]]) -> None:
+def lines_text(found: dict[str, Segments], lines: dict[str, list[list[int]]]) -> str:
     """Polylines as OBJ, an object for each kind, with the points that they use."""
-    import sys
-
-    from curvify.formats import atomic_file
-
     text, count = [], 0
     for kind, segments in found.items():
         numbers: dict[int, int] = {}
@@ -111,8 +103,4 @@ def write_lines(path: str, found: dict[str, Segments], lines: dict[str, list[lis
         text.append(f"o {kind}\n")
         text += [f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in segments.points[list(numbers)].tolist()]
         text += ["l " + " ".join(str(numbers[point]) for point in line) + "\n" for line in lines[kind]]
-    if path == "-":
-        sys.stdout.write("".join(text))
-        return
-    with atomic_file(path) as out:
-        out.write("".join(text).encode())
+    return "".join(text)

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import Any, BinaryIO, cast
 
 from curvify.errors import CurvifyError, FormatError, OptionError
-from curvify.formats import READ_FORMATS, WRITE_FORMATS, find_format, read_mesh
+from curvify.formats import READ_FORMATS, WRITE_FORMATS, atomic_file, find_format, read_mesh
 from curvify.mesh import PolygonMesh
 
 STREAM = "-"
@@ -25,6 +25,8 @@ def shown_name(path: str, stream: str) -> str:
 
 def check_input(path: str, format: str | None) -> None:
     """Raise CurvifyError unless IN has a format that can be read, so far as its name tells."""
+    if path != STREAM and os.path.isdir(path):
+        raise FormatError(f"{path}: cannot read: it is a folder; for many files there is 'curvify batch'")
     if path != STREAM or format is not None:
         with hint("--input-format", format):
             find_format(path, format, READ_FORMATS)
@@ -36,6 +38,8 @@ def check_output(path: str, format: str | None, no_clobber: bool = False) -> str
     """The format of OUT. Raises CurvifyError where it cannot be written, so far as that is known before the work."""
     if path == STREAM and format is None:
         raise OptionError("standard output needs --output-format, for example --output-format ply")
+    if path.endswith("/") or (path != STREAM and os.path.isdir(path)):
+        check_folder(path)
     with hint("--output-format", format):
         chosen = find_format(path, format, WRITE_FORMATS)
     check_target(path, no_clobber)
@@ -55,10 +59,33 @@ def check_target(path: str, no_clobber: bool = False) -> None:
 
 def check_folder(path: str) -> None:
     """Raise FormatError where a file cannot be put."""
-    if os.path.isdir(path):
+    if path.endswith("/") or os.path.isdir(path):
         raise FormatError(f"{path}: cannot write: it is a folder; give the name of a file")
     if not os.path.isdir(os.path.dirname(path) or "."):
         raise FormatError(f"{path}: cannot write: its folder does not exist; make it first")
+
+
+def check_suffix(path: str, suffix: str, rule: str) -> None:
+    """Raise FormatError unless OUT is a stream or has the one suffix that there is."""
+    if path != STREAM and os.path.splitext(path)[1].lower() != suffix:
+        raise FormatError(f"{path}: {rule}; give a name that ends in {suffix}")
+
+
+def check_ascii(ascii: bool, format: str) -> None:
+    """Raise OptionError for --ascii where it means nothing."""
+    if ascii and format != "ply":
+        raise OptionError(f"--ascii is for PLY; {format} has no such choice")
+
+
+def format_of(path: str, format: str | None) -> str | None:
+    """``--input-format`` for one of several INs: None where its suffix tells, or for the first bytes to tell."""
+    return None if os.path.splitext(path)[1].lower().removeprefix(".") in READ_FORMATS else format
+
+
+def open_input(path: str, format: str | None) -> tuple[PolygonMesh, str]:
+    """The mesh of IN and its name in messages. Raises CurvifyError."""
+    check_input(path, format)
+    return read_input(path, format), shown_name(path, "stdin")
 
 
 def read_input(path: str, format: str | None) -> PolygonMesh:
@@ -67,6 +94,17 @@ def read_input(path: str, format: str | None) -> PolygonMesh:
         with hint("--input-format", format):
             return read_mesh(path)
     return read_mesh(path, format)
+
+
+def write_bytes(data: bytes, path: str) -> None:
+    """Write a file, completely or not at all, or to standard output."""
+    if path == STREAM:
+        stdout = CountedStdout()
+        stdout.write(data)
+        stdout.flush()
+        return
+    with atomic_file(path) as out:
+        out.write(data)
 
 
 @contextmanager

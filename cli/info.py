@@ -46,9 +46,7 @@ def info_file(input: str, input_format: str | None, as_json: bool, quiet: bool, 
     from curvify.inspection import describe_prepared
     from curvify.prepare import prepare_mesh
 
-    files.check_input(input, input_format)
-    mesh = files.read_input(input, input_format)
-    name = files.shown_name(input, "stdin")
+    mesh, name = files.open_input(input, input_format)
     asked = asked_for(refine_options)
     try:
         coarse = prepare_mesh(mesh, asked.mesh_options())

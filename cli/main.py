@@ -177,6 +177,8 @@ def text_of(error: BaseException) -> tuple[str, bool]:
 def _usage_text(error: Any) -> str:
     """Click's message with a hint where to look."""
     message = error.format_message().strip().rstrip(".")
+    if "unexpected extra argument" in message:
+        message += "; names with blanks need quotes"
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else "curvify"
     return f"{message[:1].lower()}{message[1:]} (try '{path} --help')"

@@ -54,12 +54,10 @@ def marks_file(
     verbose: bool,
 ) -> None:
     """Read, gather, write. Raises CurvifyError."""
-    import os
-
     from curvify.cli import files
     from curvify.cli.console import Console
-    from curvify.errors import FormatError, MeshError
-    from curvify.formats.marks_json import marks_text, read_marks, write_marks
+    from curvify.errors import MeshError
+    from curvify.formats.marks_json import marks_text, read_marks
     from curvify.options import MeshOptions
     from curvify.prepare import prepare_mesh
     from curvify.words import count_of
@@ -68,24 +66,18 @@ def marks_file(
     chosen = {"weld": weld, "sharp_from": sharp_from, "sharp_angle": sharp_angle}
     plain = {name: value for name, value in chosen.items() if value is not None}
     MeshOptions(**plain)  # type: ignore[arg-type]
-    files.check_input(input, input_format)
-    if output != files.STREAM:
-        files.check_folder(output)
-        if no_clobber and os.path.lexists(output):
-            raise FormatError(f"{output}: it exists already; leave out --no-clobber to replace it")
+    files.check_target(output, no_clobber)
     extra = None if marks is None else read_marks(marks)
-    mesh = files.read_input(input, input_format)
-    name = files.shown_name(input, "stdin")
+    mesh, name = files.open_input(input, input_format)
     with files.naming(name, MeshError):
         coarse = prepare_mesh(mesh, MeshOptions(**plain, marks=extra))  # type: ignore[arg-type]
     for text in coarse.warnings:
         console.warn(f"{name}: {text}")
     found = coarse.found_marks()
-    if output == files.STREAM:
-        click.echo(marks_text(found), nl=False)
-    else:
-        write_marks(found, output)
+    files.write_bytes(marks_text(found).encode(), output)
     for source, counts in coarse.marks.counts.items():
         console.explain(f"{name}: {source}: {', '.join(count_of(n, kind) for kind, n in counts.items())}")
     listed = ", ".join(count_of(n, f"{kind} mark") for kind, n in found.counts().items())
+    if not listed:
+        console.tell(f"{name}: no marks found; --sharp-angle 40 finds edges where faces turn by more than 40 degrees")
     console.explain(f"{files.shown_name(output, 'stdout')}: {listed or 'no marks'}")

@@ -23,7 +23,24 @@ SURFACE, SIMPLIFYING, SHARP, TRIMMING, MESH, OUTPUT, RUNNING, MESSAGES = (
     "Running",
     "Messages",
 )
-POSITIVE = click.IntRange(min=1)
+
+
+class Whole(click.IntRange):
+    """Whole numbers in a range; click's own message calls what is none "not a valid integer range"."""
+
+    name = "whole number"
+
+
+class Number(click.FloatRange):
+    """Numbers in a range."""
+
+    name = "number"
+
+
+POSITIVE = Whole(min=1)
+#: IN and OUT; what cannot be read is told by the reader.
+FILE = click.Path(allow_dash=True, readable=False)
+DEGREES = Number(min=0, max=180)
 #: More faces than this in one range are a slip of the keyboard.
 MOST_FACES = 10_000_000
 
@@ -45,11 +62,11 @@ def with_options(*decorators: Callable[[Any], Any]) -> Callable[[Function], Func
 
 
 in_and_out = with_options(
-    click.argument("input", metavar="IN", type=click.Path(allow_dash=True)),
-    click.argument("output", metavar="OUT", type=click.Path(allow_dash=True)),
+    click.argument("input", metavar="IN", type=FILE),
+    click.argument("output", metavar="OUT", type=FILE),
 )
 
-only_in = click.argument("input", metavar="IN", type=click.Path(allow_dash=True))
+only_in = click.argument("input", metavar="IN", type=FILE)
 
 # --- surface ----------------------------------------------------------------------------------------------------
 
@@ -196,7 +213,7 @@ proxies = option(
 compactness = option(
     SIMPLIFYING,
     "--compactness",
-    type=click.FloatRange(min=0),
+    type=Number(min=0),
     default=4.0,
     show_default=True,
     metavar="L",
@@ -205,7 +222,7 @@ compactness = option(
 dense_angle = option(
     SIMPLIFYING,
     "--sharp-angle",
-    type=click.FloatRange(min=0, max=180, min_open=True),
+    type=Number(min=0, max=180, min_open=True),
     default=30.0,
     show_default=True,
     metavar="DEG",
@@ -296,7 +313,7 @@ split_rule = option(
 max_sides = option(
     MESH,
     "--max-sides",
-    type=click.IntRange(min=3),
+    type=Whole(min=3),
     default=64,
     show_default=True,
     metavar="N",
@@ -363,6 +380,10 @@ dry_run = option(RUNNING, "--dry-run", is_flag=True, help="Say how large OUT wou
 quiet = option(MESSAGES, "-q", "--quiet", is_flag=True, help="No warnings and no progress bar, only errors.")
 verbose = option(MESSAGES, "-v", "--verbose", is_flag=True, help="Explain what was done and how long it took.")
 messages = with_options(quiet, verbose)
+
+
+#: Where a command that changes polygons writes them, and how.
+polygons_out = with_options(input_format, output_format, precision, as_text, no_clobber, messages)
 
 
 def print_json(command: str, answer: dict[str, Any]) -> None:

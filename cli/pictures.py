@@ -9,6 +9,7 @@ import click
 
 from curvify.cli import options
 from curvify.cli.options import option
+from curvify.records import record
 
 if TYPE_CHECKING:
     from curvify.cli.console import Console
@@ -37,6 +38,20 @@ class Limits(click.ParamType):  # type: ignore[type-arg,unused-ignore]
             self.fail(f"'{value}' is not a range; give two numbers in order, as in 0,2.5")
         return low, high
 
+
+
+
+def _some_meshes(context: click.Context, _: click.Parameter, inputs: tuple[str, ...]) -> tuple[str, ...]:
+    """The INs; without any, the one name that was given is OUT's."""
+    if not inputs and not context.resilient_parsing:
+        raise click.UsageError("two names are needed at least: a mesh, and the file to make", context)
+    return inputs
+
+
+in_and_out = options.with_options(
+    click.argument("inputs", metavar="IN...", nargs=-1, callback=_some_meshes, type=options.FILE),
+    click.argument("output", metavar="OUT", type=options.FILE),
+)
 
 style = option(
     LOOK,
@@ -108,43 +123,66 @@ up = option(
 )
 
 
-def style_of(style: str, values: str | None, limits: tuple[float, float] | None) -> str:
-    """The style of the layers. Raises OptionError for options that do not go together."""
-    from curvify.errors import OptionError
+@record
+class Subjects:
+    """The meshes to show and the options of their look, as they were given."""
 
-    if values is None and limits is not None:
-        raise OptionError("--limits are those of --values; say which values")
-    if values is not None and style != "shaded":
-        raise OptionError(f"--values and --style {style} both color the surface; leave out one of them")
-    return style if values is None else "values"
+    inputs: tuple[str, ...]
+    control: str | None
+    input_format: str | None
+    style: str
+    shading: str
+    values: str | None
+    limits: tuple[float, float] | None
+    wire: bool
+
+    @classmethod
+    def taken_from(cls, given: dict[str, Any]) -> Subjects:
+        """Those among all options ``given``, which they are taken out of."""
+        return cls(**{name: given.pop(name) for name in cls.__annotations__})
+
+    @property
+    def names(self) -> list[str]:
+        """All files to read."""
+        return [*self.inputs, *([] if self.control is None else [self.control])]
+
+    def check(self) -> None:
+        """Raise CurvifyError for names that cannot be read and options that do not go together."""
+        from curvify.cli import files
+        from curvify.errors import OptionError
+
+        if self.names.count(files.STREAM) > 1:
+            raise OptionError("standard input can be read only once")
+        for name in self.names:
+            if name != files.STREAM:
+                files.check_input(name, files.format_of(name, self.input_format))
+        if self.values is None and self.limits is not None:
+            raise OptionError("--limits are those of --values; say which values")
+        if self.values is not None and self.style != "shaded":
+            raise OptionError(f"--values and --style {self.style} both color the surface; leave out one of them")
+
+    def layers(self, settings: Settings, console: Console) -> tuple[list[Layer], Layer | None, Settings]:
+        """A layer for each IN, one of the control mesh to draw over them, and the settings with a scale for all values.
+
+        A file that is named twice is read once. Raises CurvifyError.
+        """
+        from curvify.gpu.scene import Layer, Stroke
+
+        meshes = {name: read(name, self.input_format, console) for name in dict.fromkeys(self.names)}
+        shown = {name: vertex_values(meshes[name], self.values) for name in dict.fromkeys(self.inputs)}
+        style = self.style if self.values is None else "values"
+        line = Stroke() if self.wire else None
+        layers = [Layer(meshes[name], style, self.shading, wire=line, values=shown[name]) for name in self.inputs]
+        over = None if self.control is None else control_layer(meshes[self.control])
+        return layers, over, with_scale(settings, list(shown.values()), self.values, self.limits)
 
 
-def check_names(
-    names: list[str], output: str, suffix: str, rule: str, format: str | None, no_clobber: bool
-) -> None:
-    """Raise CurvifyError for names that cannot be read or written, so far as they tell; OUT must have a suffix."""
-    from pathlib import Path
-
+def check_output(output: str, suffix: str, rule: str, no_clobber: bool) -> None:
+    """Raise CurvifyError for an OUT that cannot be written, so far as its name tells; it must have a suffix."""
     from curvify.cli import files
-    from curvify.errors import FormatError, OptionError
 
-    if output != files.STREAM and Path(output).suffix.lower() != suffix:
-        raise FormatError(f"{output}: {rule}; give the last name the suffix {suffix}")
+    files.check_suffix(output, suffix, rule)
     files.check_target(output, no_clobber)
-    if names.count(files.STREAM) > 1:
-        raise OptionError("standard input can be read only once")
-    for name in names:
-        if name != files.STREAM:
-            files.check_input(name, format_of(name, format))
-
-
-def format_of(name: str, format: str | None) -> str | None:
-    """``--input-format`` for the files whose suffix does not tell, None for the others."""
-    from pathlib import Path
-
-    from curvify.formats import READ_FORMATS
-
-    return None if Path(name).suffix.lower().removeprefix(".") in READ_FORMATS else format
 
 
 def short_name(name: str) -> str:
@@ -161,8 +199,7 @@ def read(name: str, format: str | None, console: Console) -> PolygonMesh:
     from curvify.cli import files
     from curvify.errors import MeshError
 
-    mesh = files.read_input(name, format_of(name, format))
-    shown = files.shown_name(name, "stdin")
+    mesh, shown = files.open_input(name, files.format_of(name, format))
     if not mesh.face_count:
         raise MeshError(f"{shown}: the mesh has no faces; there is nothing to show")
     for text in mesh.warnings:
@@ -203,17 +240,3 @@ def control_layer(mesh: PolygonMesh) -> Layer:
 
     ink = (0.72, 0.17, 0.10)
     return Layer(mesh, "hidden", wire=Stroke(ink, 1.8, hidden=0.18), dots=Stroke(ink, 6.0, hidden=0.0))
-
-
-def write(data: bytes, output: str) -> None:
-    """Write a file, completely or not at all, or to standard output."""
-    from curvify.cli import files
-    from curvify.formats import atomic_file
-
-    if output == files.STREAM:
-        stdout = files.CountedStdout()
-        stdout.write(data)
-        stdout.flush()
-        return
-    with atomic_file(output) as out:
-        out.write(data)

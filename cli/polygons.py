@@ -8,7 +8,7 @@ import numpy as np
 
 from curvify.cli import files
 from curvify.cli.console import Console
-from curvify.errors import FormatError, MeshError, OptionError
+from curvify.errors import FormatError, MeshError
 from curvify.formats import write_mesh
 from curvify.mesh import PolygonMesh
 
@@ -30,11 +30,8 @@ def change_file(
 ) -> tuple[PolygonMesh, PolygonMesh]:
     """Read IN, change it, ``say`` what was done, write OUT; the mesh before and after. Raises CurvifyError."""
     format = files.check_output(output, output_format, no_clobber)
-    if ascii and format != "ply":
-        raise OptionError(f"--ascii is for PLY; {format} has no such choice")
-    files.check_input(input, input_format)
-    mesh = files.read_input(input, input_format)
-    name = files.shown_name(input, "stdin")
+    files.check_ascii(ascii, format)
+    mesh, name = files.open_input(input, input_format)
     with files.naming(name, MeshError):
         if not mesh.face_count:
             raise MeshError("the mesh has no faces; give a mesh with polygons")

@@ -35,8 +35,7 @@ EXAMPLES = (
 
 
 @click.command(name="render", cls=Command, examples=EXAMPLES, short_help=COMMANDS["render"])
-@click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=click.Path(allow_dash=True))
-@click.argument("output", metavar="OUT", type=click.Path(allow_dash=True))
+@pictures.in_and_out
 @options.with_options(
     pictures.style,
     pictures.shading,
@@ -50,7 +49,7 @@ EXAMPLES = (
     options.option(
         pictures.PICTURE,
         "--turntable",
-        type=click.IntRange(1, 360),
+        type=options.Whole(1, 360),
         default=1,
         metavar="N",
         help="Draw each IN N times in a row, turned all around.",
@@ -70,7 +69,7 @@ EXAMPLES = (
     options.option(
         pictures.PICTURE,
         "--field-of-view",
-        type=click.FloatRange(0, 120),
+        type=options.Number(0, 120),
         default=24.0,
         show_default=True,
         metavar="DEG",
@@ -110,53 +109,40 @@ def command(**given: Any) -> None:
     drawn with OpenGL, without a display; a GPU is used where there is one, and none is needed. '-' is standard input
     or output.
     """
-    render_files(**given)
+    render_files(pictures.Subjects.taken_from(given), **given)
 
 
 def render_files(
-    inputs: tuple[str, ...],
+    subjects: pictures.Subjects,
     output: str,
-    style: str,
-    shading: str,
-    values: str | None,
-    limits: tuple[float, float] | None,
-    wire: bool,
-    control: str | None,
     captions: tuple[str, ...],
     turntable: int,
     columns: int | None,
-    input_format: str | None,
     no_clobber: bool,
     quiet: bool,
     verbose: bool,
     **look: Any,
 ) -> None:
     """Read, draw, write. Raises CurvifyError."""
+    from curvify.cli import files
     from curvify.cli.console import Console
     from curvify.gpu.device import open_device
     from curvify.gpu.picture import picture, to_png
-    from curvify.gpu.scene import Layer, Panel, Stroke
+    from curvify.gpu.scene import Panel
 
     console = Console(quiet, verbose)
-    names = [*inputs, *([control] if control is not None else [])]
-    pictures.check_names(names, output, ".png", "pictures are PNG files", input_format, no_clobber)
-    texts = captions_of(inputs, captions)
-    style = pictures.style_of(style, values, limits)
+    pictures.check_output(output, ".png", "pictures are PNG files", no_clobber)
+    subjects.check()
+    texts = captions_of(subjects.inputs, captions)
     settings = settings_of(**look, columns=columns or (turntable if turntable > 1 else None))
-    settings.check(len(inputs) * turntable)
+    settings.check(len(texts) * turntable)
     with open_device() as device:
         console.explain(f"{device.renderer}, OpenGL {device.version}")
-        meshes = {name: pictures.read(name, input_format, console) for name in dict.fromkeys(names)}
-        shown = {name: pictures.vertex_values(meshes[name], values) for name in dict.fromkeys(inputs)}
-        settings = pictures.with_scale(settings, list(shown.values()), values, limits)
-        over = [pictures.control_layer(meshes[control])] if control is not None else []
-        line = Stroke() if wire else None
-        panels = [
-            Panel([Layer(meshes[name], style, shading, wire=line, values=shown[name]), *over], text)
-            for name, text in zip(inputs, texts, strict=True)
-        ]
+        layers, over, settings = subjects.layers(settings, console)
+        above = [] if over is None else [over]
+        panels = [Panel([layer, *above], text) for layer, text in zip(layers, texts, strict=True)]
         image = picture(turned(panels, turntable, settings), settings, device)
-    pictures.write(to_png(image), output)
+    files.write_bytes(to_png(image), output)
     console.explain(f"{output}: {image.shape[1]} x {image.shape[0]} pixels")
 
 

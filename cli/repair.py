@@ -24,19 +24,14 @@ EXAMPLES = (
     options.option(
         "Repair",
         "--holes",
-        type=click.IntRange(min=0),
+        type=options.Whole(min=0),
         default=0,
         show_default=True,
         metavar="N",
         help="Close holes of up to this many edges, each with one polygon.",
     ),
     options.weld,
-    options.input_format,
-    options.output_format,
-    options.precision,
-    options.as_text,
-    options.no_clobber,
-    options.messages,
+    options.polygons_out,
 )
 def command(**given: Any) -> None:
     """Mend what refine only warns of.

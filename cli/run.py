@@ -26,7 +26,7 @@ from curvify.refinement import Refinable, refinable
 from curvify.schemes import NAMES, load_scheme
 from curvify.sinks import DenseLayout, Sink
 from curvify.threads import processors
-from curvify.words import count_of
+from curvify.words import count_of, listed
 
 if TYPE_CHECKING:
     from curvify.mask import Mask
@@ -248,8 +248,7 @@ def check(request: Request) -> tuple[Any, str]:
     options = scheme_options(request.scheme, request.scheme_options)
     check_trim(request)
     format = files.check_output(request.output, request.output_format, request.no_clobber)
-    if request.ascii and format != "ply":
-        raise OptionError(f"--ascii is for PLY; {format} has no such choice")
+    files.check_ascii(request.ascii, format)
     files.check_input(request.input, request.input_format)
     if request.report is not None:
         _check_report(request, request.report)
@@ -262,9 +261,18 @@ def scheme_options(scheme: str, given: dict[str, Any]) -> Any:
     for name in given:
         if name not in kind.__dataclass_fields__:
             owners = [other for other in NAMES if name in load_scheme(other).Options.__dataclass_fields__]
-            schemes = f"the scheme{'s' if len(owners) > 1 else ''} {' and '.join(owners)}"
-            raise OptionError(f"--{name.replace('_', '-')} is for {schemes}, not for {scheme}")
-    return kind(**given)
+            schemes = f"the scheme{'s' if len(owners) > 1 else ''} {listed(owners)}"
+            raise OptionError(f"{flag(name)} is for {schemes}, not for {scheme}")
+    try:
+        return kind(**given)
+    except OptionError as error:  # the library calls options by their names in Python
+        first, blank, rest = str(error).partition(" ")
+        raise OptionError(f"{flag(first) if first in given else first}{blank}{rest}") from None
+
+
+def flag(name: str) -> str:
+    """An option as it is typed."""
+    return f"--{name.replace('_', '-')}"
 
 
 def _check_report(request: Request, report: str) -> None:

@@ -24,12 +24,7 @@ EXAMPLES = (
 @options.with_options(
     options.split_rule,
     options.max_sides,
-    options.input_format,
-    options.output_format,
-    options.precision,
-    options.as_text,
-    options.no_clobber,
-    options.messages,
+    options.polygons_out,
 )
 def command(**given: Any) -> None:
     """Cut concave and many-sided faces into convex ones.

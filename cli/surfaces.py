@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from curvify.cli.group import Option
+from curvify.records import record
 
 if TYPE_CHECKING:
     from curvify.mesh import PolygonMesh
@@ -51,7 +51,7 @@ def refine_values(input: str, output: str, given: dict[str, Any]) -> dict[str, A
     return {**values, **known, "input": input, "output": output}
 
 
-@dataclass(frozen=True)
+@record
 class Asked:
     """The surface that options of refine ask for: the ``scheme``, its ``options``, the ``level`` and ``max_faces``."""
 
@@ -75,9 +75,13 @@ class Asked:
 
 
 def asked_for(given: dict[str, Any]) -> Asked:
-    """What the options of refine among ``given`` ask for. Raises FormatError for marks that cannot be read."""
+    """What the options of refine among ``given`` ask for. Raises FormatError for marks that cannot be read,
+    OptionError for what does not fit.
+    """
     from curvify.cli.run import Request, read_marks
 
     request = Request(**refine_values("-", "-", given))
     marks = None if request.marks is None else read_marks(request.marks)
-    return Asked(request.scheme, {**request.scheme_options, "marks": marks}, request.level, request.max_faces)
+    asked = Asked(request.scheme, {**request.scheme_options, "marks": marks}, request.level, request.max_faces)
+    asked.mesh_options()
+    return asked

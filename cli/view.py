@@ -23,8 +23,7 @@ EXAMPLES = (
 
 
 @click.command(name="view", cls=Command, examples=EXAMPLES, short_help=COMMANDS["view"])
-@click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=click.Path(allow_dash=True))
-@click.argument("output", metavar="OUT", type=click.Path(allow_dash=True))
+@pictures.in_and_out
 @options.with_options(
     pictures.style,
     pictures.shading,
@@ -50,50 +49,36 @@ def command(**given: Any) -> None:
     The options are what it starts with; keys and buttons change them: h shows which. Several INs take turns under one
     eye. '-' is standard input or output.
     """
-    view_files(**given)
+    view_files(pictures.Subjects.taken_from(given), **given)
 
 
 def view_files(
-    inputs: tuple[str, ...],
+    subjects: pictures.Subjects,
     output: str,
-    style: str,
-    shading: str,
-    values: str | None,
-    limits: tuple[float, float] | None,
-    wire: bool,
-    control: str | None,
     stripes: int,
     color: str,
     view: str,
     up: str,
     background: str,
-    input_format: str | None,
     no_clobber: bool,
     quiet: bool,
     verbose: bool,
 ) -> None:
     """Read, pack, write. Raises CurvifyError."""
+    from curvify.cli import files
     from curvify.cli.console import Console
     from curvify.gpu.camera import parse_view
     from curvify.gpu.colors import parse_color
-    from curvify.gpu.scene import Layer, Settings, Stroke
+    from curvify.gpu.scene import Settings
     from curvify.gpu.viewer import viewer_page
 
     console = Console(quiet, verbose)
-    names = [*inputs, *([control] if control is not None else [])]
-    pictures.check_names(names, output, ".html", "pages are HTML files", input_format, no_clobber)
-    style = pictures.style_of(style, values, limits)
+    pictures.check_output(output, ".html", "pages are HTML files", no_clobber)
+    subjects.check()
     settings = Settings(
         background=parse_color(background), view=parse_view(view), up=up, stripes=stripes, color=parse_color(color)
     )
-    meshes = {name: pictures.read(name, input_format, console) for name in dict.fromkeys(names)}
-    shown = [pictures.vertex_values(meshes[name], values) for name in inputs]
-    settings = pictures.with_scale(settings, shown, values, limits)
-    line = Stroke() if wire else None
-    layers = [
-        Layer(meshes[name], style, shading, wire=line, values=part) for name, part in zip(inputs, shown, strict=True)
-    ]
-    over = pictures.control_layer(meshes[control]) if control is not None else None
-    page = viewer_page(layers, [pictures.short_name(name) for name in inputs], over, settings).encode()
-    pictures.write(page, output)
+    layers, over, settings = subjects.layers(settings, console)
+    page = viewer_page(layers, [pictures.short_name(name) for name in subjects.inputs], over, settings).encode()
+    files.write_bytes(page, output)
     console.explain(f"{output}: {len(page):,} bytes")

@@ -53,7 +53,7 @@ class Mask:
 
 def read_mask(path: str | os.PathLike[str]) -> Mask:
     """Read a PNG image as a mask: its luminance, times its opacity. Raises FormatError."""
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     name = os.fspath(path)
     try:
@@ -61,7 +61,9 @@ def read_mask(path: str | os.PathLike[str]) -> Mask:
             image.load()
             return Mask(_brightness(image))
     except FileNotFoundError:
-        raise FormatError(f"{name}: no such file") from None
+        raise FormatError(f"{name}: cannot read: there is no such file") from None
+    except UnidentifiedImageError:
+        raise FormatError(f"{name}: this is no PNG image; give one that is white where to keep the surface") from None
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise FormatError(f"{name}: cannot be read as a PNG image: {error}") from None
 

@@ -88,4 +88,4 @@ def _source(kind: Kind, version: int, tile: tuple[int, int], entry: str) -> str:
 def read_shaders(version: int, constants: dict[str, int], *names: str) -> str:
     """GLSL of some sources, with constants defined."""
     lines = [f"#version {version} core", *(f"#define {name} {value}" for name, value in constants.items())]
-    return "\n".join([*lines, *((SHADERS / f"{name}.glsl").read_text() for name in names)])
+    return "\n".join([*lines, *((SHADERS / f"{name}.glsl").read_text(encoding="utf-8") for name in names)])

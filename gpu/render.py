@@ -281,7 +281,7 @@ def shares(values: Floats, limits: tuple[float, float] | None) -> Floats:
 @cache
 def shader_source(name: str) -> str:
     """The text of a shader of the package: ``surface.frag`` and so on."""
-    return (Path(__file__).parent / "shaders" / f"{name}.glsl").read_text()
+    return (Path(__file__).parent / "shaders" / f"{name}.glsl").read_text(encoding="utf-8")
 
 
 def _program(ctx: moderngl.Context, name: str) -> moderngl.Program:

@@ -197,10 +197,10 @@ def _filled(title: str, scene: dict[str, Any]) -> str:
     """The page with its parts in place."""
     parts = {
         "title": html.escape(title),
-        "style": (FOLDER / "viewer.css").read_text(),
-        "script": "\n".join((FOLDER / name).read_text() for name in SCRIPTS),
+        "style": (FOLDER / "viewer.css").read_text(encoding="utf-8"),
+        "script": "\n".join((FOLDER / name).read_text(encoding="utf-8") for name in SCRIPTS),
         # No name of a file ends the script that it stands in.
         "scene": json.dumps(scene).replace("<", "\\u003c"),
     }
-    page = (FOLDER / "page.html").read_text()
+    page = (FOLDER / "page.html").read_text(encoding="utf-8")
     return re.sub(r"\{(title|style|script|scene)\}", lambda found: parts[found[1]], page)

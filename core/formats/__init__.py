@@ -48,7 +48,10 @@ def find_format(path: str | os.PathLike[str], format: str | None, known: tuple[s
         raise FormatError(f"unknown format '{format}'; known are {listed}")
     if name == "-":
         raise FormatError(f"the format of standard input or output must be given, one of {listed}")
-    what = f"unknown suffix '.{chosen}'" if chosen else "the name has no suffix"
+    if chosen in READ_FORMATS:
+        what = f"'.{chosen}' cannot be used here"
+    else:
+        what = f"unknown suffix '.{chosen}'" if chosen else "the name has no suffix"
     raise FormatError(f"{name}: {what}; name the format, one of {listed}")
 
 
@@ -71,11 +74,36 @@ def read_mesh(
         except OSError as error:
             raise FormatError(f"stdin: cannot read: {error.strerror}") from None
         chosen = find_format("-", format or _sniff(data), READ_FORMATS)
+    _check_start(data, name, chosen)
     module = _module(chosen, "read")
     mesh: PolygonMesh = (
         getattr(module, f"read_{chosen}")(data, name) if chosen in _OWN else module.read_other(data, name, chosen)
     )
     return mesh
+
+
+#: How files of other formats begin that are mistaken for OBJ, which begins anyhow.
+_STARTS = {
+    b"ply": "a PLY",
+    b"OFF": "an OFF",
+    b"solid": "an STL",
+    b"glTF": "a GLB",
+    b"PK\3\4": "a 3MF",
+    b"\x89PNG": "a PNG",
+}
+
+
+def _check_start(data: bytes, name: str, format: str) -> None:
+    """Raise FormatError for an empty file, and for one that is plainly no OBJ: as OBJ it would have nothing in it."""
+    if not data:
+        raise FormatError(f"{name}: the file is empty")
+    if format != "obj":
+        return
+    for start, what in _STARTS.items():
+        if data.startswith(start):
+            raise FormatError(f"{name}: this is {what} file, not OBJ; give it the suffix of its format")
+    if b"\0" in data[:1024]:
+        raise FormatError(f"{name}: this is no OBJ file: it is not text")
 
 
 def _sniff(data: bytes) -> str | None:

@@ -32,6 +32,9 @@ def read_marks(path: str | os.PathLike[str]) -> Marks:
     name = os.fspath(path)
     try:
         content = json.loads(read_bytes(name).decode("utf-8-sig"))
+    except json.JSONDecodeError as error:
+        what = f"{error.msg[:1].lower()}{error.msg[1:]}"
+        raise FormatError(f"{name}:{error.lineno}: not a JSON file: {what} (column {error.colno})") from None
     except (ValueError, RecursionError) as error:
         raise FormatError(f"{name}: not a JSON file: {error}") from None
     return parse_marks(content, name)

@@ -184,7 +184,9 @@ def test_patterns_and_names(call, assets):
 BAD = {
     "nothing fits": (["assets/*.stl", "--output-dir", "out"], "assets/*.stl"),
     "only outputs fit": (["assets/**/*.obj", "--output-dir", "assets"], "except in assets"),
-    "unknown suffix": (["assets/**/*.obj", "--output-dir", "out", "--suffix", ".blend"], ".blend"),
+    "unknown suffix": (["*.obj", "--output-dir", "out", "--suffix", ".blend"], "--suffix .blend: that is no format"),
+    "a folder": (["assets/a", "--output-dir", "out"], "give a pattern in quotes, such as 'assets/a/**/*.obj'"),
+    "a file to put files in": (["cube.obj", "--output-dir", "cube.obj"], "--output-dir cube.obj: that is a file"),
     "two to one": (["assets/a/*.obj", "assets/b/../a/*.obj", "--output-dir", "out"], "would both go to"),
     "over itself": (["*.obj", "--output-dir", ".", "--suffix", ".obj"], "except in ."),
     "named over itself": (["cube.obj", "--output-dir", ".", "--suffix", ".obj"], "would replace an input"),
@@ -352,7 +354,7 @@ def test_no_scheduler(call, assets, monkeypatch):
 def test_no_dask(call, assets, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     result = call("batch", "assets/**/*.obj", "--output-dir", "out", "--dask", "tcp://127.0.0.1:1")
-    assert (result.code, "pip install 'curvify[dask]'" in result.err) == (2, True)
+    assert (result.code, "pip install 'distributed>=2024.1'" in result.err) == (2, True)
 
 
 def test_nothing_is_lost_when_a_dask_worker_dies(call, process, folder):

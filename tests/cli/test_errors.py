@@ -17,7 +17,19 @@ BAD = {
     "no suffix": (["refine", "cube.obj", "dense"], "--output-format"),
     "unknown format": (["refine", "cube.obj", "dense", "--output-format", "blend"], "'blend'"),
     "format of stdout": (["refine", "cube.obj", "-"], "--output-format ply"),
-    "empty file": (["refine", "empty.obj", "dense.ply"], "empty.obj: the mesh has no faces"),
+    "empty file": (["refine", "empty.obj", "dense.ply"], "empty.obj: the file is empty"),
+    "a PLY called OBJ": (["info", "ply.obj"], "ply.obj: this is a PLY file, not OBJ"),
+    "bytes called OBJ": (["info", "bytes.obj"], "bytes.obj: this is no OBJ file: it is not text"),
+    "folder in": (["refine", "sub.obj", "dense.ply"], "sub.obj: cannot read: it is a folder; for many files there is"),
+    "folder out": (["refine", "cube.obj", "sub.obj/"], "sub.obj/: cannot write: it is a folder; give the name of"),
+    "gltf out": (["refine", "cube.obj", "dense.gltf"], "dense.gltf: '.gltf' cannot be used here; name the format"),
+    "level of a half": (["refine", "cube.obj", "dense.ply", "-k", "2.5"], "'2.5' is not a valid whole number"),
+    "angle too wide": (["refine", "cube.obj", "dense.ply", "--sharp-angle", "400"], "--sharp-angle must be from 0 to"),
+    "angle too wide for curves": (["curves", "cube.obj", "a.obj", "--sharp-angle", "400"], "--sharp-angle must be"),
+    "name with blanks": (["refine", "my", "cube.obj", "dense.ply"], "names with blanks need quotes"),
+    "two numbers for three": (["curves", "cube.obj", "a.obj", "--view", "1", "2"], "(try 'curvify curves --help')"),
+    "no picture": (["render", "cube.obj"], "two names are needed at least"),
+    "curves as PLY": (["curves", "cube.obj", "a.ply"], "a.ply: curves are written as OBJ only; give a name that ends"),
     "points only": (["refine", "points.obj", "dense.ply"], "points.obj: the mesh has no faces, only 2 points"),
     "garbage": (["refine", "garbage.ply", "dense.ply"], "garbage.ply"),
     "bad index": (["refine", "index.obj", "dense.ply"], "index.obj:2"),
@@ -38,7 +50,7 @@ BAD = {
     "report of nothing": (["refine", "cube.obj", "dense.ply", "--report", "r.json", "--dry-run"], "--dry-run"),
     "too large": (["refine", "large.ply", "dense.ply", "--precision", "float32"], "scale the mesh below"),
     "unknown command": (["refin", "cube.obj", "dense.ply"], "refine"),
-    "split empty": (["split", "empty.obj", "dense.ply"], "empty.obj: the mesh has no faces"),
+    "split empty": (["split", "empty.obj", "dense.ply"], "empty.obj: the file is empty"),
     "split to 2 sides": (["split", "cube.obj", "dense.ply", "--max-sides", "2"], "--max-sides"),
     "split too large": (["split", "large.ply", "dense.ply", "--precision", "float32"], "dense.ply: "),
     "split ascii": (["split", "cube.obj", "dense.off", "--ascii"], "--ascii"),
@@ -49,6 +61,8 @@ BAD = {
 def bad_files(folder):
     """Files that cannot be used."""
     Path("empty.obj").write_text("")
+    Path("ply.obj").write_text("ply\nformat ascii 1.0\nend_header\n")
+    Path("bytes.obj").write_bytes(bytes(range(256)))
     Path("points.obj").write_text("v 0 0 0\nv 1 0 0\n")
     Path("garbage.ply").write_bytes(bytes(range(256)))
     Path("index.obj").write_text("v 0 0 0\nf 1 2 3\n")

@@ -109,7 +109,7 @@ def test_pipes(opengl, process, folder):
     [
         ("cube.obj cube.jpg", "cube.jpg: pictures are PNG files"),
         ("cube.obj cube", "cube: pictures are PNG files"),
-        ("cube.png", "missing argument"),
+        ("cube.png", "two names are needed at least"),
         ("cube.obj nowhere/a.png", "its folder does not exist"),
         ("cube.obj taken.png --no-clobber", "taken.png: it exists already"),
         ("none.obj a.png", "none.obj: cannot read"),

@@ -67,8 +67,8 @@ def test_the_same_bytes_to_a_file_and_a_pipe(call, folder):
     [
         (["--trim-mode", "drop"], "--trim-mode says how to trim by an image; give one with --trim FILE"),
         (["--trim-invert"], "--trim-invert says how to trim by an image; give one with --trim FILE"),
-        (["--trim", "cube.obj"], "cube.obj: cannot be read as a PNG image"),
-        (["--trim", "none.png"], "none.png: no such file"),
+        (["--trim", "cube.obj"], "cube.obj: this is no PNG image"),
+        (["--trim", "none.png"], "none.png: cannot read: there is no such file"),
         (["--trim", DISC, "--trim-map", "uv"], "cube.obj: the mesh has no texture coordinates"),
         (["--trim", "black.png"], "cube.obj: the image trims everything away"),
         (["--chart", "polar"], "--chart is for the scheme blend, not for gregory"),

@@ -34,7 +34,7 @@ FRAMES = {
     "reset": "control=0&gesture=reset",
 }
 #: What pointers do on the canvas: places are apart from its middle. ``drag`` turns as in the frame "turned", and moves
-#: pointers that are up; ``shift`` moves the mesh by ``SHIFT`` with the key, with the right button, and with two fingers;
+#: pointers that are up; ``shift`` moves the mesh by ``SHIFT``: with the key, the right button, and two fingers;
 #: ``zoom`` pinches to 3 and turns the wheel to 1.5. A page may have 16 contexts of WebGL: as many as there are frames.
 SHIFT = (36, -24)
 GESTURES = """<script type="module">
@@ -256,7 +256,7 @@ def test_every_option_changes_the_page(call, folder):
 @pytest.mark.parametrize(
     ("line", "text"),
     [
-        ("cube.obj page.png", "page.png: pages are HTML files; give the last name the suffix .html"),
+        ("cube.obj page.png", "page.png: pages are HTML files; give a name that ends in .html"),
         ("cube.obj nowhere/a.html", "its folder does not exist"),
         ("cube.obj taken.html --no-clobber", "taken.html: it exists already"),
         ("none.obj a.html", "none.obj: cannot read"),
