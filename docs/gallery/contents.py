@@ -19,6 +19,7 @@ from figures import (
     planar_top,
     rings,
     silhouettes,
+    simplified,
     smooth_and_sharp,
     tetrahedra,
     trimmed,
@@ -46,6 +47,15 @@ PAPERS = (
                 "From polygons to a surface: the pawn's 90 polygons; the curves of its edges, with the edges "
                 "themselves thin in black; the patches between the curves, with their grids; the surface.",
                 construction,
+                {"size": (220, 300)},
+            ),
+            Figure(
+                "simplified",
+                "8",
+                "From a dense mesh to polygons and back: the triangles; regions that are nearly flat, found by "
+                "variational shape approximation; convex polygons for them; the surface over the polygons, with the "
+                "normals and creases that were found.",
+                simplified,
                 {"size": (220, 300)},
             ),
             Figure(

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 import curvify
+from curvify.formats.dense import to_polygon_mesh
 from curvify.gpu.scene import Layer, Lines, Panel, Stroke
+from curvify.simplify import Options, simplify
 from meshes import (
     SAMPLES,
     at_limit,
@@ -21,6 +23,7 @@ from meshes import (
     curves_of,
     loop_surface,
     marks_of,
+    regions,
     sample,
     subdivided,
     tetrahedron,
@@ -72,6 +75,20 @@ def construction() -> list[Panel]:
         Panel([Layer(dense, "hidden", lines=curves), Layer(mesh, "hidden", wire=FINE)], "curves of the edges"),
         Panel([Layer(dense, lines=curves), Layer(grid, "hidden", wire=FINE)], "patches"),
         Panel([Layer(dense)], "surface"),
+    ]
+
+
+def simplified() -> list[Panel]:
+    """Dense triangles, their regions, the polygons, and the surface over these."""
+    dense = triangulated(to_polygon_mesh(curvify.refine(sample("pawn"), level=4)))
+    found = simplify(dense, Options(faces=110))
+    apart, shades, borders = regions(found)
+    lines = [Lines(borders, Stroke(width=1.4))]
+    return [
+        Panel([Layer(dense, shading="flat", wire=Stroke(width=0.4))], f"{dense.face_count:,} triangles"),
+        Panel([Layer(apart, "values", shading="flat", values=shades, lines=lines)], "regions"),
+        coarse(found.mesh, f"{found.mesh.face_count} polygons"),
+        surface(found.mesh, "surface"),
     ]
 
 

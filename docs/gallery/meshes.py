@@ -13,6 +13,7 @@ from curvify.formats.dense import to_polygon_mesh
 from curvify.formats.marks_json import read_marks
 from curvify.normals import sum_by, unit
 from curvify.polygons import newell_normals
+from curvify.simplify import Simplified
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_meshes"
 Floats = npt.NDArray[np.float64]
@@ -100,6 +101,22 @@ def triangulated(mesh: curvify.PolygonMesh) -> curvify.PolygonMesh:
     """Every polygon as a fan of triangles from its first corner, without normals."""
     faces = [[face[0], a, b] for face in mesh.faces() for a, b in pairwise(face[1:])]
     return curvify.PolygonMesh.from_faces(mesh.positions, faces)
+
+
+def regions(found: Simplified) -> tuple[curvify.PolygonMesh, Floats, Floats]:
+    """The triangles that were simplified, apart from each other, a value for each vertex that tells the region, and
+    the lines ``(n,2,3)`` between regions.
+    """
+    dense, labels = found.dense, found.labels
+    count = len(dense.vertices)
+    apart = curvify.PolygonMesh.from_faces(
+        dense.positions[dense.vertices.reshape(-1)], np.arange(3 * count).reshape(-1, 3).tolist()
+    )
+    shade = np.random.default_rng(8).permutation(int(labels.max()) + 1)[labels]
+    twin, own = dense.twin, np.repeat(labels, 3)
+    border = np.flatnonzero((twin >= 0) & (own < own[twin]))
+    ends = np.stack([border, border - border % 3 + (border + 1) % 3], axis=1)
+    return apart, np.repeat(shade.astype(float), 3), dense.positions[dense.vertices.reshape(-1)[ends]]
 
 
 # --- Loop's subdivision surface of a closed mesh of triangles --------------------------------------------------------
