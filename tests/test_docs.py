@@ -13,6 +13,8 @@ from types import ModuleType
 
 import pytest
 
+from opengl import device_or_skip
+
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 
@@ -84,6 +86,18 @@ def test_the_page_on_checking_works_as_written(bash, tmp_path: Path) -> None:
     (code,) = re.findall(r"```python\n(.*?)```", (DOCS / "checking.md").read_text(encoding="utf-8"), re.DOTALL)
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stdout.splitlines()[-1]) == (0, "0")
+
+
+def test_the_first_five_minutes_work_as_written(bash, tmp_path: Path) -> None:
+    with device_or_skip():
+        pass
+    shutil.copytree(ROOT / "sample_meshes", tmp_path / "sample_meshes")
+    install, lines = re.findall(r"```sh\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    assert "pip install ." in install
+    said = bash(lines)
+    assert "up to" in said and "manifold: yes" in said and said.endswith("groups: yes: equal\n")
+    made = ("pawn.ply", "pawn.png", "pawn.html", "sharp.ply", "apart.png", "out/vase.ply")
+    assert all((tmp_path / name).stat().st_size for name in made)
 
 
 def test_the_lines_on_completion_give_scripts(bash) -> None:
