@@ -21,8 +21,8 @@ def command(as_json: bool) -> None:
     """List the surface schemes and their options.
 
     For each scheme: the faces it takes, what of the mesh it keeps, how smoothly the surface continues across their
-    edges, the normals it offers, its options with their defaults, and the paper that it comes from. What they measure side
-    by side is in docs/choosing-a-scheme.md.
+    edges, the normals it offers, its options with their defaults, and the paper that it comes from. What they measure
+    side by side is in docs/choosing-a-scheme.md.
     """
     schemes = [describe(name) for name in scheme_names()]
     if as_json:
