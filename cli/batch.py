@@ -53,8 +53,8 @@ NOT_FORWARDED = ("input_format", "output_format", "no_clobber", "report", "dry_r
         "Batch",
         "--dask",
         metavar="ADDRESS",
-        help="Work on a Dask cluster: the address of its scheduler, tcp://host:8786. Needs curvify with its extra dask there "
-        "too, and the files under the same names.",
+        help="Work on a Dask cluster: the address of its scheduler, tcp://host:8786. Needs curvify with its extra dask "
+        "there too, and the files under the same names.",
     ),
     options.option("Batch", "--report", metavar="FILE", help="Write what became of each file as JSON; '-' for stdout."),
     options.messages,
