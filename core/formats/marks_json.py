@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from curvify.errors import FormatError
-from curvify.formats.files import atomic_file, read_bytes
+from curvify.formats.files import read_bytes
 from curvify.mesh import Floats, Ints, Marks
 
 VERSION = 1
@@ -203,9 +203,3 @@ def marks_text(marks: Marks) -> str:
             lines = [json.dumps({place: at, **entries[at]}, allow_nan=False) for at in sorted(entries)]
             parts.append(f'"{list_name}": [\n  ' + ",\n  ".join(lines) + "\n ]")
     return "{" + ",\n ".join(parts) + "}\n"
-
-
-def write_marks(marks: Marks, path: str | os.PathLike[str]) -> None:
-    """Write a marks file, completely or not at all. Raises FormatError."""
-    with atomic_file(path) as out:
-        out.write(marks_text(marks).encode())
