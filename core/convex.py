@@ -205,13 +205,16 @@ def _repeats(key: Ints, area: Floats, face: Ints) -> Bools:
     return repeats
 
 
-def split_at_corners(positions: Floats, split: Split, bad_corners: Bools, corner_normals: Floats) -> Split:
+def split_at_corners(
+    positions: Floats, split: Split, bad_corners: Bools, corner_normals: Floats, least: float = -np.inf
+) -> Split:
     """Cut each piece with a bad corner by one diagonal from that corner (the folding rule).
 
     ``bad_corners (C',)`` and ``corner_normals (C',3)`` are by corner of the pieces of ``split``. The diagonal
     goes to the corner that makes the smallest sine of the two pieces' corners, seen along their normals,
     largest; never along an edge. A piece stays where no diagonal makes all sines positive or the smallest
-    larger, and its face then counts as ``unsplit``. Repeat with the pieces' own bad corners as needed.
+    larger, or where those at its ends would be less than ``least``, and its face then counts as ``unsplit``.
+    Repeat with the pieces' own bad corners as needed.
     """
     offsets, vertices = split.face_offsets, split.face_vertices
     bad = np.asarray(bad_corners, dtype=bool)
@@ -223,6 +226,7 @@ def split_at_corners(positions: Floats, split: Split, bad_corners: Bools, corner
     rows, normals = np.ascontiguousarray(positions.T), np.ascontiguousarray(np.asarray(corner_normals).T)
     for _ in range(ROUNDS):
         start, end, worth = _folding_diagonals(rows, split, pieces, bad, normals, avoid)
+        start, end, worth = (part[worth >= least] for part in (start, end, worth))
         reasons[split.source_faces[np.setdiff1d(pieces, owner[start])]] |= FOLDED
         keys = edge_keys(vertices[start], vertices[end])
         again = _repeats(keys, worth, owner[start])
