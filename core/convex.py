@@ -226,7 +226,8 @@ def split_at_corners(
     rows, normals = np.ascontiguousarray(positions.T), np.ascontiguousarray(np.asarray(corner_normals).T)
     for _ in range(ROUNDS):
         start, end, worth = _folding_diagonals(rows, split, pieces, bad, normals, avoid)
-        start, end, worth = (part[worth >= least] for part in (start, end, worth))
+        wide = worth >= least
+        start, end, worth = start[wide], end[wide], worth[wide]
         reasons[split.source_faces[np.setdiff1d(pieces, owner[start])]] |= FOLDED
         keys = edge_keys(vertices[start], vertices[end])
         again = _repeats(keys, worth, owner[start])

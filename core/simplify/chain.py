@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from curvify.mesh import Bools, Ints, Marks, PolygonMesh
+from curvify.mesh import Bools, Ints, PolygonMesh
 from curvify.simplify.checks import check_polygons
 from curvify.simplify.decimate import lightened
-from curvify.simplify.features import flat_polygons, sector_normals
 from curvify.simplify.polygons import Polygons
 from curvify.simplify.search import Attempt, Options, Progress, as_they_are, find_polygons
 from curvify.simplify.triangles import Triangles, prepare_triangles
@@ -52,7 +49,7 @@ def simplify(mesh: PolygonMesh, options: Options, progress: Progress | None = No
     else:
         attempt = find_polygons(dense, metric, options, notes, tell)
     tell("normals", 0.95)
-    check_polygons(dense, attempt.polygons)
+    check_polygons(dense, attempt.drawn.polygons)
     counts = {"input_faces": mesh.face_count, "triangles": original.face_count}
     return _result(mesh, original, dense, attempt, counts, [*mesh.warnings, *notes])
 
@@ -65,46 +62,15 @@ def _result(
     counts: dict[str, int],
     warnings: list[str],
 ) -> Simplified:
-    """The polygons as a mesh of their own, with normals and marks."""
-    polygons, creases = attempt.polygons, attempt.creases
-    normals = sector_normals(dense, attempt.labels, polygons, creases)
-    used = np.zeros(len(dense.positions), dtype=bool)
-    used[polygons.vertices] = True
-    number = np.cumsum(used) - 1
-    coarse = PolygonMesh(
-        positions=dense.positions[used],
-        face_offsets=polygons.offsets,
-        face_vertices=number[polygons.vertices],
-        corner_normals=normals,
-        marks=_marks(dense, attempt, number),
-        position_dtype=mesh.position_dtype,
-    )
+    """The mesh as the input's file would hold it, and what there is to say about it."""
+    drawn = attempt.drawn
+    coarse = drawn.mesh.with_(position_dtype=mesh.position_dtype)
     counts |= {
         "regions": int(attempt.labels.max()) + 1,
-        "faces": polygons.count,
+        "faces": coarse.face_count,
+        "fold_cuts": attempt.extra,
         "vertices": coarse.vertex_count,
         "crease_edges": len(coarse.marks.crease_edges),
         "flat_faces": len(coarse.marks.flat_faces),
     }
-    return Simplified(coarse, original, dense, polygons, attempt.labels, creases, counts, warnings)
-
-
-def _marks(dense: Triangles, attempt: Attempt, number: Ints) -> Marks:
-    """Crease edges, and flat faces that only creases or their like in one plane surround."""
-    polygons, creases = attempt.polygons, attempt.creases
-    topology = polygons.topology(dense.positions)
-    once = np.flatnonzero(creases & (topology.twin > np.arange(len(creases))))
-    edges = number[np.stack([polygons.vertices[once], polygons.vertices[topology.next[once]]], axis=1)]
-    flat = flat_polygons(dense, attempt.labels, polygons)
-    return Marks(
-        crease_edges=edges,
-        crease_sharpness=np.ones((len(edges), 2)),
-        flat_faces=np.flatnonzero(flat & _set_apart(topology.faces, topology.twin, creases, flat)),
-    )
-
-
-def _set_apart(faces: Ints, twin: Ints, creases: Bools, flat: Bools) -> Bools:
-    """Faces ``(P,)`` each side of which is a crease, a boundary or shared with a flat face."""
-    beside = (twin >= 0) & flat[faces[np.maximum(twin, 0)]]
-    open_ = np.bincount(faces, ~(creases | beside), len(flat))
-    return open_ == 0
+    return Simplified(coarse, original, dense, drawn.polygons, attempt.labels, drawn.creases, counts, warnings)

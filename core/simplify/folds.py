@@ -92,13 +92,13 @@ class Unfolded:
     """A mesh without most of its folds.
 
     ``corners (C',)`` is the corner of the given mesh that each was, ``diagonals (C',)`` tells where a new edge leaves
-    it; ``stand_in (V,)`` the vertex of the new mesh for each of the given one. ``cuts`` and ``collapses`` were made.
+    it; ``vertices (V',)`` the vertex of the given mesh that each is. ``cuts`` and ``collapses`` were made.
     """
 
     mesh: PolygonMesh
     corners: Ints
     diagonals: Bools
-    stand_in: Ints
+    vertices: Ints
     cuts: int = 0
     collapses: int = 0
 
@@ -114,7 +114,7 @@ class Unfolded:
             later.mesh,
             self.corners[later.corners],
             later.diagonals | self.diagonals[later.corners],
-            later.stand_in[self.stand_in],
+            self.vertices[later.vertices],
             self.cuts + later.cuts,
             self.collapses + later.collapses,
         )
@@ -282,7 +282,7 @@ def _collapsed(mesh: PolygonMesh, topology: Topology, half_edges: Ints) -> Unfol
         changed,
         loops.source_corners,
         np.zeros(len(loops.vertices), dtype=bool),
-        number[moved],
+        np.flatnonzero(kept),
         collapses=len(half_edges),
     )
 

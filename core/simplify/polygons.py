@@ -53,6 +53,32 @@ class Polygons:
             self.sharp,
         )
 
+    def recut(self, offsets: Ints, half_edges: Ints, diagonals: Bools, vertices: Ints) -> Polygons:
+        """Polygons made of the half-edges of these, or of diagonals that leave their tails, on other vertices.
+
+        The path of a diagonal is one step. Where a vertex has taken the place of another, paths that left this begin
+        with a step to it.
+        """
+        moved = ~diagonals & (vertices != self.vertices[half_edges])
+        extra = diagonals | moved
+        sizes = np.where(diagonals, 1, self.sizes[half_edges] + moved)
+        rows, which = ranges(self.starts[half_edges[moved]], self.sizes[half_edges[moved]])
+        added, owner = np.flatnonzero(extra), np.flatnonzero(moved)[which]
+        order = np.argsort(np.concatenate([added, owner]), kind="stable")
+        steps = np.concatenate([vertices[added], self.steps[rows]])[order]
+        sharp = np.concatenate([np.zeros(len(added), dtype=bool), self.sharp[rows]])[order]
+        starts = self.starts[half_edges]
+        starts[extra] = len(self.steps) + np.cumsum(sizes[extra]) - sizes[extra]
+        return Polygons(
+            offsets,
+            vertices,
+            self.regions[half_edges],
+            starts,
+            sizes,
+            np.concatenate([self.steps, steps]),
+            np.concatenate([self.sharp, sharp]),
+        )
+
     def topology(self, positions: Floats) -> Topology:
         """Edges and twins, on the vertices of the dense mesh."""
         return build_topology(positions, self.offsets, self.vertices)

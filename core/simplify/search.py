@@ -1,7 +1,8 @@
 """The search for as many polygons as are wanted: how many regions, and how closely polygons follow them.
 
-Convex pieces outnumber regions by an amount that only trying tells. Too few polygons ask for more regions; many more
-polygons than regions ask for chords that may leave their borders further.
+Convex pieces outnumber regions by an amount that only trying tells, and so do the cuts that keep patches from folding.
+Too few polygons ask for more regions; many more polygons than regions ask for chords that may leave their borders
+further.
 """
 
 from __future__ import annotations
@@ -14,8 +15,10 @@ import numpy as np
 from curvify.errors import OptionError
 from curvify.mesh import Bools, Ints
 from curvify.simplify.borders import SHARE, Tolerance
+from curvify.simplify.coarse import Drawn, draw
 from curvify.simplify.decompose import Partition, polygonize
 from curvify.simplify.features import find_creases, sharp_half_edges
+from curvify.simplify.folds import unfold
 from curvify.simplify.merge import FREE, PRESSED, drop_vertices, merge
 from curvify.simplify.polygons import Polygons
 from curvify.simplify.regions import bisect
@@ -41,6 +44,8 @@ SHARP_TOLERANCE, SMOOTH_TOLERANCE = 0.12, 0.4
 DROP_TOLERANCE = 0.012
 #: The count asked for is met within this share.
 CLOSE = 0.05
+#: How often merging is tried anew to make up for the cuts at folds, and from which share on.
+FOLD_ROUNDS, FOLD_SHARE = 4, 0.01
 
 Progress = Callable[[str, float], None]
 
@@ -75,7 +80,7 @@ class Options:
 @dataclass(eq=False)
 class Attempt:
     """Polygons from regions ``labels``; ``unmerged`` those before merging, ``drop`` how far dropping vertices may move
-    creases.
+    creases. ``drawn`` is the mesh that they make, with the cuts at folds.
     """
 
     polygons: Polygons
@@ -85,6 +90,28 @@ class Attempt:
     sharp: Bools
     tolerance: Tolerance
     drop: float
+    drawn: Drawn
+
+    @property
+    def count(self) -> int:
+        """Polygons of the mesh."""
+        return self.drawn.polygons.count
+
+    @property
+    def extra(self) -> int:
+        """How many of them the cuts at folds have made."""
+        return self.count - self.polygons.count
+
+    def merged(self, dense: Triangles, polygons: Polygons, creases: Bools) -> Attempt:
+        """The same with other polygons on its regions."""
+        return replace(self, polygons=polygons, creases=creases, drawn=unfolded(dense, self.labels, polygons, creases))
+
+
+def unfolded(dense: Triangles, labels: Ints, polygons: Polygons, creases: Bools) -> Drawn:
+    """The mesh of the polygons, cut where patches would fold."""
+    drawn = draw(dense, labels, polygons, creases)
+    done = unfold(drawn.mesh)
+    return drawn.changed(done.mesh, done.corners, done.diagonals, done.vertices)
 
 
 def as_they_are(dense: Triangles, metric: Metric, options: Options) -> Attempt:
@@ -93,7 +120,8 @@ def as_they_are(dense: Triangles, metric: Metric, options: Options) -> Attempt:
     sharp, tolerance = sharp_half_edges(dense, options.sharp_angle), Tolerance(0.0, 0.0)
     polygons = polygonize(Partition(dense, metric, sharp, tolerance, options.split_rule, labels))
     creases = find_creases(dense, metric, labels, polygons)
-    return Attempt(polygons, creases, labels, polygons, sharp, tolerance, 0.0)
+    drawn = draw(dense, labels, polygons, creases)
+    return Attempt(polygons, creases, labels, polygons, sharp, tolerance, 0.0, drawn)
 
 
 @dataclass(eq=False)
@@ -128,13 +156,13 @@ class Search:
         """The best of some attempts."""
         attempts = [self._attempt(0)]
         while len(attempts) < ATTEMPTS:
-            found = attempts[-1].polygons.count
+            found = attempts[-1].count
             if self.wanted <= found <= SURPLUS * self.wanted:
                 break
             if not self._adjust(found, int(attempts[-1].labels.max()) + 1):
                 break
             attempts.append(self._attempt(len(attempts)))
-        return min(attempts, key=lambda one: _misses(one.polygons.count, self.wanted))
+        return min(attempts, key=lambda one: _misses(one.count, self.wanted))
 
     def _attempt(self, number: int) -> Attempt:
         self.tell("regions", 0.9 * (1 - 0.5**number))
@@ -188,7 +216,7 @@ def find_polygons(
         labels = compacted(dense, metric, labels, options)
         return polygons_of(dense, metric, labels, options, int(labels.max()) + 1)
     best = Search(dense, metric, options, options.faces, tell).run()
-    if best.polygons.count < options.faces:
+    if best.count < options.faces:
         best = _fill(dense, metric, best, options, options.faces)
     return _reduce(dense, best, options.faces, notes)
 
@@ -196,6 +224,7 @@ def find_polygons(
 def _fill(dense: Triangles, metric: Metric, attempt: Attempt, options: Options, wanted: int) -> Attempt:
     """More polygons where regions cannot tell more: free merging ends sooner, and the largest regions are halved."""
     labels, whole = attempt.labels, attempt.unmerged
+    wanted = max(wanted - attempt.extra, 1)
     for _ in range(ATTEMPTS):
         missing = wanted - whole.count
         if missing <= 0:
@@ -210,7 +239,7 @@ def _fill(dense: Triangles, metric: Metric, attempt: Attempt, options: Options, 
         whole, labels = polygonize(partition), partition.labels
     creases = find_creases(dense, metric, labels, whole)
     polygons, creases = merge(dense.positions, whole, creases, FREE, wanted)
-    return replace(attempt, polygons=polygons, creases=creases, labels=labels)
+    return replace(attempt, labels=labels).merged(dense, polygons, creases)
 
 
 def compacted(dense: Triangles, metric: Metric, labels: Ints, options: Options) -> Ints:
@@ -236,22 +265,33 @@ def polygons_of(
     polygons, creases = merge(dense.positions, whole, creases, FREE, 1)
     drop = loose * DROP_TOLERANCE * size
     polygons, creases = drop_vertices(dense.positions, polygons, creases, drop)
-    return Attempt(polygons, creases, partition.labels, whole, sharp, tolerance, drop)
+    drawn = unfolded(dense, partition.labels, polygons, creases)
+    return Attempt(polygons, creases, partition.labels, whole, sharp, tolerance, drop, drawn)
 
 
 def _reduce(dense: Triangles, attempt: Attempt, wanted: int, notes: list[str]) -> Attempt:
-    """Merge down to the number wanted."""
-    polygons, creases = attempt.polygons, attempt.creases
-    for limits in PRESSED:
-        polygons, creases = merge(dense.positions, polygons, creases, limits, wanted)
-    polygons, creases = drop_vertices(dense.positions, polygons, creases, attempt.drop)
-    if polygons.count > (1 + CLOSE) * wanted:
+    """Merge down to the number wanted, cuts at folds included."""
+    for _ in range(FOLD_ROUNDS):
+        had = attempt.polygons.count
+        if attempt.count <= (1 + FOLD_SHARE) * wanted:
+            break
+        attempt = _pressed(dense, attempt, had - (attempt.count - wanted))
+        if attempt.polygons.count == had:
+            break
+    if attempt.count > (1 + CLOSE) * wanted:
         notes.append(
             f"{count_of(wanted, 'face')} cannot hold this mesh's topology and creases; "
-            f"{polygons.count:,} are the fewest found"
+            f"{attempt.count:,} are the fewest found"
         )
-    elif polygons.count < (1 - CLOSE) * wanted:
-        notes.append(f"{count_of(polygons.count, 'face')} hold everything; more would add nothing")
-    return replace(attempt, polygons=polygons, creases=creases)
+    elif attempt.count < (1 - CLOSE) * wanted:
+        notes.append(f"{count_of(attempt.count, 'face')} hold everything; more would add nothing")
+    return attempt
 
 
+def _pressed(dense: Triangles, attempt: Attempt, target: int) -> Attempt:
+    """Merge down to a number of polygons before cuts, as gently as can be."""
+    polygons, creases = attempt.polygons, attempt.creases
+    for limits in PRESSED:
+        polygons, creases = merge(dense.positions, polygons, creases, limits, max(target, 1))
+    polygons, creases = drop_vertices(dense.positions, polygons, creases, attempt.drop)
+    return attempt.merged(dense, polygons, creases)
