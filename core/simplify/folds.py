@@ -26,15 +26,14 @@ from curvify.options import MeshOptions
 from curvify.pieces import pieces_of
 from curvify.prepare import prepare_mesh
 from curvify.records import record, replaced
-from curvify.simplify.polygons import ranges, shapes_of
+from curvify.simplify.moves import apart, corners_at, keeps_shapes
+from curvify.simplify.polygons import shapes_of
 from curvify.topology import Topology, clean_loops
 
 #: Corners with a sine below this are flagged (3 degrees), and those below minus this are reversed.
 LEAST_SINE = float(np.sin(np.radians(3.0)))
 #: The corners that a cut makes must open by at least this (5 degrees) seen along the normals: 8 degrees and less tilt.
 LEAST_CUT = float(np.sin(np.radians(5.0)))
-#: Cosine that a polygon must keep with itself, and the least sine of its corners, when one of its vertices moves.
-TURNED, THIN = 0.8, 0.05
 #: Rounds of cutting and collapsing; each takes away at most one fold of a polygon.
 ROUNDS = 6
 
@@ -168,9 +167,10 @@ def collapse_folded(mesh: PolygonMesh) -> Unfolded:
     lines = coarse.features().sharp.any(axis=1) | ~topology.interior
     half_edges = _candidates(mesh, topology, folds, lines)
     half_edges = half_edges[_linked_simply(topology, half_edges)]
-    half_edges = half_edges[_keeps_shapes(mesh.positions, topology, half_edges)]
+    tails, heads = topology.vertices[half_edges], topology.vertices[topology.next[half_edges]]
+    half_edges = half_edges[keeps_shapes(mesh.positions, topology, tails, heads)]
     for _ in range(ROUNDS):  # what does not help makes room for others
-        chosen = _apart(topology, half_edges)
+        chosen = half_edges[apart(topology, topology.vertices[half_edges])]
         result = _collapsed(mesh, topology, chosen)
         helps = _fewer_folds(topology, chosen, folds, result)
         if helps.all():
@@ -196,22 +196,13 @@ def _candidates(mesh: PolygonMesh, topology: Topology, folds: Folds, lines: Bool
     return found[np.lexsort((found, length[found]))]
 
 
-def _around(topology: Topology, half_edges: Ints) -> tuple[Ints, Ints]:
-    """Corners at the tails of the half-edges, tail by tail, and the index of the half-edge ``(n,)`` of each."""
-    order = np.argsort(topology.vertices, kind="stable")
-    first = np.searchsorted(topology.vertices[order], np.arange(topology.vertex_count + 1))
-    tails = topology.vertices[half_edges]
-    rows, which = ranges(first[tails], np.diff(first)[tails])
-    return order[rows], which
-
-
 def _linked_simply(topology: Topology, half_edges: Ints) -> Bools:
     """Half-edges that can collapse without a change of topology: the link condition (Dey et al. 1999).
 
     The two ends share no neighbors but the tips of triangles on the edge, and no polygons but those two.
     """
     vertices, heads = topology.vertices, topology.vertices[topology.next]
-    corners, which = _around(topology, half_edges)
+    corners, which = corners_at(topology, topology.vertices[half_edges])
     target = heads[half_edges][which]
     edges = np.sort(edge_keys(topology.edges[:, 0], topology.edges[:, 1]))
     # On an interior vertex each edge leaves one corner.
@@ -225,38 +216,6 @@ def _linked_simply(topology: Topology, half_edges: Ints) -> Bools:
     return (common == tips) & (shared == 2)
 
 
-def _keeps_shapes(positions: Floats, topology: Topology, half_edges: Ints) -> Bools:
-    """Whether all polygons around the tails stay convex, turned as they were and no needles, with the heads there."""
-    corners, which = _around(topology, half_edges)
-    face = topology.faces[corners]
-    rows, piece = ranges(topology.offsets[face], topology.sizes[face])
-    tail, head = topology.vertices[half_edges][which], topology.vertices[topology.next[half_edges]][which]
-    loop = topology.vertices[rows]
-    moves = loop == tail[piece]
-    moved = np.where(moves, head[piece], loop)
-    beside = np.bincount(piece, loop == head[piece], len(face)) > 0
-    kept = ~(moves & beside[piece])
-    sizes = np.bincount(piece[kept], minlength=len(face))
-    whole = sizes >= 3
-    kept &= whole[piece]
-    old = shapes_of(positions, loop, topology.sizes[face])
-    new = shapes_of(positions, moved[kept], sizes[whole])
-    fine = new.acceptable & (new.least_sines > np.minimum(THIN, old.least_sines[whole]))
-    fine &= np.einsum("pi,pi->p", new.normals, old.normals[whole]) > TURNED
-    good = np.ones(len(half_edges), dtype=bool)
-    good[which[whole][~fine]] = False
-    return good
-
-
-def _apart(topology: Topology, half_edges: Ints) -> Ints:
-    """Those of the half-edges, best first, that are the best of all that touch any of the polygons around them."""
-    corners, which = _around(topology, half_edges)
-    best = np.full(len(topology.offsets) - 1, len(half_edges))
-    np.minimum.at(best, topology.faces[corners], which)
-    beaten = np.bincount(which, best[topology.faces[corners]] < which, len(half_edges))
-    return half_edges[beaten == 0]
-
-
 def _collapsed(mesh: PolygonMesh, topology: Topology, half_edges: Ints) -> Unfolded:
     """The mesh with the tails of the half-edges moved to their heads."""
     tails, ends = topology.vertices[half_edges], topology.next[half_edges]
@@ -267,7 +226,7 @@ def _collapsed(mesh: PolygonMesh, topology: Topology, half_edges: Ints) -> Unfol
     normals = mesh.corner_normals
     loops = clean_loops(mesh.face_offsets, moved[mesh.face_vertices])
     if normals is not None:
-        corners, which = _around(topology, half_edges)
+        corners, which = corners_at(topology, topology.vertices[half_edges])
         normals = normals.copy()
         normals[corners] = normals[ends][which]
         normals = normals[loops.source_corners]
@@ -301,7 +260,7 @@ def _renumbered(marks: Marks, vertices: Ints, faces: Ints) -> Marks:
 
 def _fewer_folds(topology: Topology, half_edges: Ints, folds: Folds, result: Unfolded) -> Bools:
     """Which collapses leave fewer flagged corners in the polygons around them."""
-    corners, which = _around(topology, half_edges)
+    corners, which = corners_at(topology, topology.vertices[half_edges])
     owner = np.full(len(topology.offsets) - 1, len(half_edges))
     owner[topology.faces[corners]] = which
     after = folded_corners(result.mesh)

@@ -22,6 +22,7 @@ from curvify.simplify.folds import unfold
 from curvify.simplify.merge import FREE, PRESSED, drop_vertices, merge
 from curvify.simplify.polygons import Polygons
 from curvify.simplify.regions import bisect
+from curvify.simplify.slide import slide_vertices
 from curvify.simplify.triangles import Triangles, face_components
 from curvify.simplify.vsa import COMPACT_SWEEPS, SWEEPS, Metric, cluster, exchange
 from curvify.words import count_of
@@ -44,8 +45,8 @@ SHARP_TOLERANCE, SMOOTH_TOLERANCE = 0.12, 0.4
 DROP_TOLERANCE = 0.012
 #: The count asked for is met within this share.
 CLOSE = 0.05
-#: How often merging is tried anew to make up for the cuts at folds, and from which share on.
-FOLD_ROUNDS, FOLD_SHARE = 4, 0.01
+#: The share of cuts at folds that may come on top of the number wanted; how often merging is tried to make up for more.
+FOLD_SHARE, FOLD_ROUNDS = 0.04, 4
 
 Progress = Callable[[str, float], None]
 
@@ -102,6 +103,10 @@ class Attempt:
         """How many of them the cuts at folds have made."""
         return self.count - self.polygons.count
 
+    def against(self, wanted: int) -> int:
+        """Polygons to hold against the number wanted, which a few cuts at folds may exceed."""
+        return self.polygons.count + max(self.extra - int(FOLD_SHARE * wanted), 0)
+
     def merged(self, dense: Triangles, polygons: Polygons, creases: Bools) -> Attempt:
         """The same with other polygons on its regions."""
         return replace(self, polygons=polygons, creases=creases, drawn=unfolded(dense, self.labels, polygons, creases))
@@ -156,13 +161,13 @@ class Search:
         """The best of some attempts."""
         attempts = [self._attempt(0)]
         while len(attempts) < ATTEMPTS:
-            found = attempts[-1].count
+            found = attempts[-1].against(self.wanted)
             if self.wanted <= found <= SURPLUS * self.wanted:
                 break
             if not self._adjust(found, int(attempts[-1].labels.max()) + 1):
                 break
             attempts.append(self._attempt(len(attempts)))
-        return min(attempts, key=lambda one: _misses(one.count, self.wanted))
+        return min(attempts, key=lambda one: _misses(one.against(self.wanted), self.wanted))
 
     def _attempt(self, number: int) -> Attempt:
         self.tell("regions", 0.9 * (1 - 0.5**number))
@@ -216,7 +221,7 @@ def find_polygons(
         labels = compacted(dense, metric, labels, options)
         return polygons_of(dense, metric, labels, options, int(labels.max()) + 1)
     best = Search(dense, metric, options, options.faces, tell).run()
-    if best.count < options.faces:
+    if best.against(options.faces) < options.faces:
         best = _fill(dense, metric, best, options, options.faces)
     return _reduce(dense, best, options.faces, notes)
 
@@ -224,7 +229,7 @@ def find_polygons(
 def _fill(dense: Triangles, metric: Metric, attempt: Attempt, options: Options, wanted: int) -> Attempt:
     """More polygons where regions cannot tell more: free merging ends sooner, and the largest regions are halved."""
     labels, whole = attempt.labels, attempt.unmerged
-    wanted = max(wanted - attempt.extra, 1)
+    wanted -= attempt.against(wanted) - attempt.polygons.count
     for _ in range(ATTEMPTS):
         missing = wanted - whole.count
         if missing <= 0:
@@ -265,6 +270,7 @@ def polygons_of(
     polygons, creases = merge(dense.positions, whole, creases, FREE, 1)
     drop = loose * DROP_TOLERANCE * size
     polygons, creases = drop_vertices(dense.positions, polygons, creases, drop)
+    polygons = slide_vertices(dense.positions, polygons, creases)
     drawn = unfolded(dense, partition.labels, polygons, creases)
     return Attempt(polygons, creases, partition.labels, whole, sharp, tolerance, drop, drawn)
 
@@ -273,9 +279,9 @@ def _reduce(dense: Triangles, attempt: Attempt, wanted: int, notes: list[str]) -
     """Merge down to the number wanted, cuts at folds included."""
     for _ in range(FOLD_ROUNDS):
         had = attempt.polygons.count
-        if attempt.count <= (1 + FOLD_SHARE) * wanted:
-            break
-        attempt = _pressed(dense, attempt, had - (attempt.count - wanted))
+        surplus = attempt.against(wanted) - wanted
+        if surplus > 0:
+            attempt = _pressed(dense, attempt, had - surplus)
         if attempt.polygons.count == had:
             break
     if attempt.count > (1 + CLOSE) * wanted:
@@ -294,4 +300,4 @@ def _pressed(dense: Triangles, attempt: Attempt, target: int) -> Attempt:
     for limits in PRESSED:
         polygons, creases = merge(dense.positions, polygons, creases, limits, max(target, 1))
     polygons, creases = drop_vertices(dense.positions, polygons, creases, attempt.drop)
-    return attempt.merged(dense, polygons, creases)
+    return attempt.merged(dense, slide_vertices(dense.positions, polygons, creases), creases)
