@@ -76,6 +76,25 @@ def plate(holes: int, steps: int = 3) -> PolygonMesh:
     return boxes(solid, steps)
 
 
+def holed_sheet(holes: int = 2, steps: int = 31) -> PolygonMesh:
+    """An open height field with ``holes`` squared square holes."""
+    mesh = sheet(steps)
+    triangles = mesh.face_vertices.reshape(-1, 3)
+    x, y = (mesh.positions[triangles].mean(axis=1)[:, i] * holes % 1 for i in (0, 1))
+    return mesh_of(mesh.positions, triangles[(np.abs(x - 0.5) > 0.2) | (np.abs(y - 0.5) > 0.2)])
+
+
+def prism(sides: int = 16, rings: int = 7, height: float = 3.0) -> PolygonMesh:
+    """A closed prism over a regular polygon: the cylinder of a part, as a coarse tessellation has it."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    loops = [np.stack([np.cos(angle), np.sin(angle), 0 * angle + z], axis=1) for z in np.linspace(0, height, rings)]
+    i, j, last = np.arange(sides), (np.arange(sides) + 1) % sides, sides * (rings - 1)
+    caps = [np.stack([j, i, 0 * i + sides * rings], axis=1), np.stack([i, j, 0 * i + 1], axis=1)]
+    caps[1] = caps[1] + np.array([last, last, sides * rings])
+    walls = grid(rings, sides, wrap_columns=True)[:, ::-1]
+    return mesh_of(np.concatenate([*loops, [[0, 0, 0], [0, 0, height]]]), np.concatenate([walls, *caps]))
+
+
 def needles() -> PolygonMesh:
     """A cylinder of very thin triangles, closed by fans with slivers."""
     count = 60

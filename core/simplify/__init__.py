@@ -6,7 +6,7 @@
 Source: Leung, Wang, Zhang, section 2.4; Cohen-Steiner, Alliez & Desbrun 2004 (docs/simplify.md).
 """
 
+from curvify.simplify.attempts import Options
 from curvify.simplify.chain import Simplified, simplify
-from curvify.simplify.search import Options
 
 __all__ = ["Options", "Simplified", "simplify"]

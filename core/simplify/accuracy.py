@@ -8,7 +8,7 @@ import numpy as np
 
 from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.nearest import nearest_points, places_on, spread
-from curvify.polygons import sum_over_faces
+from curvify.polygons import next_corners, sum_over_faces
 from curvify.simplify.triangles import Triangles
 
 #: Samples on each of the two surfaces, and the level at which patches are measured.
@@ -44,10 +44,8 @@ def flat_triangles(mesh: PolygonMesh) -> Surface:
     """The polygons as triangles about the mean of their corners."""
     sizes = mesh.face_sizes
     middle = sum_over_faces(mesh.positions[mesh.face_vertices], mesh.face_offsets) / sizes[:, None]
-    following = np.arange(1, mesh.corner_count + 1)
-    following[mesh.face_offsets[1:] - 1] = mesh.face_offsets[:-1]
     center = mesh.vertex_count + mesh.corner_faces
-    triangles = np.stack([mesh.face_vertices, mesh.face_vertices[following], center], axis=1)
+    triangles = np.stack([mesh.face_vertices, mesh.face_vertices[next_corners(mesh.face_offsets)], center], axis=1)
     return np.concatenate([mesh.positions, middle]), triangles
 
 

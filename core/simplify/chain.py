@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from curvify.mesh import Bools, Ints, PolygonMesh
+from curvify.simplify.attempts import Attempt, Options, as_they_are
 from curvify.simplify.checks import check_polygons
+from curvify.simplify.crossings import crosses_itself, crossing_polygons
 from curvify.simplify.decimate import lightened
 from curvify.simplify.polygons import Polygons
-from curvify.simplify.search import Attempt, Options, Progress, as_they_are, find_polygons
+from curvify.simplify.search import Progress, find_polygons
 from curvify.simplify.triangles import Triangles, prepare_triangles
 from curvify.simplify.vsa import Metric
 from curvify.words import count_of
@@ -51,6 +53,10 @@ def simplify(mesh: PolygonMesh, options: Options, progress: Progress | None = No
     tell("normals", 0.95)
     check_polygons(dense, attempt.drawn.polygons)
     counts = {"input_faces": mesh.face_count, "triangles": original.face_count}
+    counts["crossings"] = len(crossing_polygons(attempt.drawn.mesh))
+    if counts["crossings"]:
+        places = count_of(counts["crossings"], "place")
+        notes.append(f"polygons cross each other in {places}" + ", and so does the input" * crosses_itself(original))
     return _result(mesh, original, dense, attempt, counts, [*mesh.warnings, *notes])
 
 

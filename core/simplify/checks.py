@@ -7,7 +7,7 @@ import numpy as np
 from curvify.arrays import distinct
 from curvify.errors import MeshError
 from curvify.mesh import Ints
-from curvify.simplify.polygons import Polygons, shapes_of
+from curvify.simplify.polygons import Polygons, pillows, shapes_of
 from curvify.simplify.triangles import Triangles
 from curvify.topology import Topology, fans
 
@@ -43,24 +43,11 @@ def find_problems(dense: Triangles, polygons: Polygons) -> list[str]:
     note(len(distinct(fans(topology))[0]) - used, "vertices with several fans")
     euler = used - len(topology.edges) + polygons.count
     note(int(euler != dense.euler_number), f"Euler number {euler} for {dense.euler_number}")
-    note(_same_sets(polygons), "faces on the vertices of another")
+    note(len(pillows(polygons.vertices, polygons.sides)), "faces on the vertices of another")
     shapes = shapes_of(dense.positions, polygons.vertices, polygons.sides)
     kept = _is_triangle_of(dense, polygons, topology)
     note(int((~shapes.acceptable & ~kept).sum()), "concave or degenerate faces")
     return problems
-
-
-def _same_sets(polygons: Polygons) -> int:
-    """Number of polygons with the vertices of an earlier one."""
-    owner = np.repeat(np.arange(polygons.count), polygons.sides)
-    order = np.lexsort((polygons.vertices, owner))
-    vertices, total = polygons.vertices[order], 0
-    for size in np.flatnonzero(np.bincount(polygons.sides)):
-        rows = polygons.offsets[:-1][polygons.sides == size]
-        loops = vertices[rows[:, None] + np.arange(size)]
-        ranked = loops[np.lexsort(loops.T)]
-        total += int((ranked[1:] == ranked[:-1]).all(axis=1).sum())
-    return total
 
 
 def _is_triangle_of(dense: Triangles, polygons: Polygons, topology: Topology) -> Ints:

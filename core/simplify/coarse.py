@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from curvify.mesh import Bools, Ints, Marks, PolygonMesh
-from curvify.simplify.features import flat_polygons, sector_normals
+from curvify.simplify.features import sector_normals, sectors_of
+from curvify.simplify.flats import facet_creases, level, planes_of, set_apart, straight_lines
 from curvify.simplify.polygons import Polygons
 from curvify.simplify.triangles import Triangles
 
@@ -36,31 +37,26 @@ def draw(dense: Triangles, labels: Ints, polygons: Polygons, creases: Bools) -> 
     used = np.zeros(len(dense.positions), dtype=bool)
     used[polygons.vertices] = True
     number = np.cumsum(used) - 1
+    topology = polygons.topology(dense.positions)
+    planes = planes_of(dense, labels, polygons)
+    creases = creases | facet_creases(planes, topology)
+    normals = sector_normals(dense, labels, polygons, creases)
+    once = (topology.twin < 0) | (topology.twin > np.arange(len(creases)))
+    ends = number[np.stack([polygons.vertices, polygons.vertices[topology.next]], axis=1)]
+    edges = ends[creases & once & (topology.twin >= 0)]
+    normals = level(normals, sectors_of(topology, creases), planes, topology)
+    apart = set_apart(planes, topology, creases)
+    straight = straight_lines(dense.positions, polygons, topology, creases, planes, apart)
     mesh = PolygonMesh(
         positions=dense.positions[used],
         face_offsets=polygons.offsets,
         face_vertices=number[polygons.vertices],
-        corner_normals=sector_normals(dense, labels, polygons, creases),
-        marks=_marks(dense, labels, polygons, creases, number),
+        corner_normals=normals,
+        marks=Marks(
+            crease_edges=edges,
+            crease_sharpness=np.ones((len(edges), 2)),
+            straight_edges=ends[straight & once],
+            flat_faces=np.flatnonzero(apart),
+        ),
     )
     return Drawn(mesh, polygons, creases, np.flatnonzero(used))
-
-
-def _marks(dense: Triangles, labels: Ints, polygons: Polygons, creases: Bools, number: Ints) -> Marks:
-    """Crease edges, and flat faces that only creases or their like in one plane surround."""
-    topology = polygons.topology(dense.positions)
-    once = np.flatnonzero(creases & (topology.twin > np.arange(len(creases))))
-    edges = number[np.stack([polygons.vertices[once], polygons.vertices[topology.next[once]]], axis=1)]
-    flat = flat_polygons(dense, labels, polygons)
-    return Marks(
-        crease_edges=edges,
-        crease_sharpness=np.ones((len(edges), 2)),
-        flat_faces=np.flatnonzero(flat & _set_apart(topology.faces, topology.twin, creases, flat)),
-    )
-
-
-def _set_apart(faces: Ints, twin: Ints, creases: Bools, flat: Bools) -> Bools:
-    """Faces ``(P,)`` each side of which is a crease, a boundary or shared with a flat face."""
-    beside = (twin >= 0) & flat[faces[np.maximum(twin, 0)]]
-    open_ = np.bincount(faces, ~(creases | beside), len(flat))
-    return open_ == 0

@@ -14,7 +14,7 @@ from curvify.convex import DOUBLED, UNSPLIT, Split, split_polygons
 from curvify.errors import MeshError
 from curvify.mesh import Bools, Floats, Ints
 from curvify.simplify.borders import Borders, Chords, Tolerance, chords_of, farthest, find_anchors, region_borders
-from curvify.simplify.polygons import Polygons, shapes_of
+from curvify.simplify.polygons import Polygons, pillows, shapes_of
 from curvify.simplify.regions import bisect, make_discs
 from curvify.simplify.triangles import Triangles
 from curvify.simplify.vsa import Metric, proxies, two_means
@@ -115,21 +115,8 @@ def _failed_regions(partition: Partition, split: Split, normals: Floats) -> Bool
     bad = ~shapes.acceptable | (facing <= FACING) | ((sizes == 3) & (shapes.least_sines < NEEDLE))
     failed: Bools = (split.reasons & (UNSPLIT | DOUBLED)) != 0
     failed[region[bad]] = True
-    failed[region[_pillows(split.face_vertices, sizes)]] = True
+    failed[region[pillows(split.face_vertices, sizes)]] = True
     return failed & (np.bincount(partition.labels, minlength=partition.count) > 1)
-
-
-def _pillows(vertices: Ints, sizes: Ints) -> Ints:
-    """Polygons on the very vertices of another."""
-    first = np.cumsum(sizes) - sizes
-    found = []
-    for size in np.flatnonzero(np.bincount(sizes)):
-        rows = np.flatnonzero(sizes == size)
-        loops = np.sort(vertices[first[rows][:, None] + np.arange(size)], axis=1)
-        order = np.lexsort(loops.T)
-        same = (loops[order[1:]] == loops[order[:-1]]).all(axis=1)
-        found += [rows[order[1:][same]], rows[order[:-1][same]]]
-    return np.concatenate(found)
 
 
 def _mend(partition: Partition, failed: Bools, borders: Borders, chords: Chords) -> None:

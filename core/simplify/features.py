@@ -14,6 +14,7 @@ import numpy as np
 from curvify.arrays import distinct
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import perpendicular, sum_by, unit
+from curvify.polygons import next_corners
 from curvify.simplify.polygons import Polygons, ranges, shapes_of
 from curvify.simplify.triangles import Triangles
 from curvify.simplify.vsa import Metric, proxies, region_errors
@@ -27,8 +28,6 @@ REACH = 0.3
 LINE_WEIGHT = 2.0
 #: Edges of a sector with a ratio of the larger eigenvalues below this are nearly collinear.
 COLLINEAR = 0.03
-#: Faces turned by less than this from their polygon (degrees) leave it flat.
-FLAT = 1.0
 
 
 def sharp_half_edges(mesh: Triangles, angle: float) -> Bools:
@@ -75,17 +74,11 @@ def _sharp_share(mesh: Triangles, polygons: Polygons) -> Floats:
 def _path_ends(polygons: Polygons) -> Ints:
     """The vertex at the end of each step of all paths, in the order of `Polygons.path_corners`."""
     steps, which = polygons.path_corners(np.arange(len(polygons.vertices)))
-    heads = polygons.vertices[_next(polygons)]
+    heads = polygons.vertices[next_corners(polygons.offsets)]
     ends = np.append(polygons.steps[steps[1:]], 0)
     last = np.append(which[1:] != which[:-1], True)
     ends[last] = heads
     return ends
-
-
-def _next(polygons: Polygons) -> Ints:
-    following = np.arange(1, len(polygons.vertices) + 1)
-    following[polygons.offsets[1:] - 1] = polygons.offsets[:-1]
-    return following
 
 
 @dataclass(eq=False)
@@ -272,19 +265,3 @@ def _line_directions(mesh: Triangles, polygons: Polygons, topology: Topology, en
     share = np.where(gap > 0, (reach - total[last]) / np.where(gap > 0, gap, 1.0), 0.0)
     place = points[last] + np.clip(share, 0, 1)[:, None] * (points[after] - points[last])
     return unit(place - mesh.positions[ends.vertices])
-
-
-def flat_polygons(mesh: Triangles, labels: Ints, polygons: Polygons) -> Bools:
-    """Polygons ``(P,)`` all of whose dense faces lie in their plane, within a degree."""
-    shapes = shapes_of(mesh.positions, polygons.vertices, polygons.sides)
-    count = int(labels.max()) + 1
-    normals = proxies(Metric.of(mesh), labels, count)
-    cosine = np.einsum("fi,fi->f", mesh.normals, normals[labels])
-    cosine[mesh.areas == 0] = 1.0
-    least = np.ones(count)
-    np.minimum.at(least, labels, cosine)
-    owner = np.repeat(np.arange(polygons.count), polygons.sides)
-    aligned = np.einsum("ni,ni->n", normals[polygons.regions], shapes.normals[owner])
-    limit = np.cos(np.radians(FLAT / 2))
-    uneven = np.bincount(owner, (least[polygons.regions] < limit) | (aligned < limit), polygons.count)
-    return uneven == 0

@@ -21,7 +21,7 @@ from curvify.arrays import cross, distinct
 from curvify.convex import split_at_corners, whole_faces
 from curvify.dissect import edge_keys, is_in
 from curvify.mesh import Bools, Floats, Ints, Marks, PolygonMesh
-from curvify.normals import dot
+from curvify.normals import degrees_between, dot, unit
 from curvify.options import MeshOptions
 from curvify.pieces import pieces_of
 from curvify.prepare import prepare_mesh
@@ -34,6 +34,10 @@ from curvify.topology import Topology, clean_loops
 LEAST_SINE = float(np.sin(np.radians(3.0)))
 #: The corners that a cut makes must open by at least this (5 degrees) seen along the normals: 8 degrees and less tilt.
 LEAST_CUT = float(np.sin(np.radians(5.0)))
+#: How far a vertex that is taken away may lie from the polygons around, as a share of the mean size of polygons.
+LEFT = 0.01
+#: A patch whose normals lean by less than this (degrees) is planar: a straight corner does no harm there.
+PLANAR = 1.0
 #: Rounds of cutting and collapsing; each takes away at most one fold of a polygon.
 ROUNDS = 6
 
@@ -43,7 +47,8 @@ class Folds:
     """How the corners ``(C,)`` of a mesh open.
 
     ``sines`` between the two edge curves, negative where the patch folds; ``straight`` corners that may pass straight
-    through: between two creases or boundaries, or in a flat face; ``normals (C,3)`` that `refine` will use; ``faces``.
+    through: between two creases or boundaries, or in a planar patch; ``normals (C,3)`` that `refine` will use;
+    ``faces (C,)``.
     """
 
     sines: Floats
@@ -81,7 +86,9 @@ def folded_corners(mesh: PolygonMesh) -> Folds:
     out = features.tangents[side, start] * np.where(ahead, 1.0, -1.0)[:, None]
     back = features.tangents[before, end] * np.where(behind, -1.0, 1.0)[:, None]
     sines = dot(cross(out, back), features.normals)[:, 0]
-    flat = np.isin(np.arange(mesh.face_count), mesh.marks.flat_faces)
+    plane = unit(coarse.area)[topology.faces]
+    leans = degrees_between(features.normals, plane) > PLANAR
+    flat = np.bincount(topology.faces[leans], minlength=mesh.face_count) == 0
     straight = (line[side, start] & line[before, end]) | flat[topology.faces]
     return Folds(sines, straight, features.normals, topology.faces)
 
@@ -168,7 +175,8 @@ def collapse_folded(mesh: PolygonMesh) -> Unfolded:
     half_edges = _candidates(mesh, topology, folds, lines)
     half_edges = half_edges[_linked_simply(topology, half_edges)]
     tails, heads = topology.vertices[half_edges], topology.vertices[topology.next[half_edges]]
-    half_edges = half_edges[keeps_shapes(mesh.positions, topology, tails, heads)]
+    left = LEFT * float(np.sqrt(np.linalg.norm(coarse.area, axis=1).mean() / 2))
+    half_edges = half_edges[keeps_shapes(mesh.positions, topology, tails, heads, left)]
     for _ in range(ROUNDS):  # what does not help makes room for others
         chosen = half_edges[apart(topology, topology.vertices[half_edges])]
         result = _collapsed(mesh, topology, chosen)

@@ -12,7 +12,7 @@ import numpy as np
 from curvify.arrays import distinct
 from curvify.mesh import Bools, Floats, Ints
 from curvify.simplify.borders import segment_distance
-from curvify.simplify.polygons import Polygons, Shapes, ranges, shapes_of
+from curvify.simplify.polygons import Polygons, Shapes, first_of_each, ranges, shapes_of
 from curvify.topology import Topology
 
 #: The most sides that a merged polygon may have.
@@ -32,15 +32,16 @@ FREE = Limits(0.02, 0.99)
 PRESSED = (Limits(0.04, 0.95), Limits(0.08, 0.9), Limits(0.12, 0.8), Limits(0.2, 0.6))
 
 
-def merge(positions: Floats, polygons: Polygons, creases: Bools, limits: Limits, target: int) -> tuple[Polygons, Bools]:
+def merge(positions: Floats, polygons: Polygons, kept: Bools, limits: Limits, target: int) -> tuple[Polygons, Ints]:
     """Merge neighbors until there are ``target`` polygons or none can be merged within the limits.
 
-    ``creases (C,)`` are half-edges to keep; those of the result come with it.
+    ``kept (C,)`` are half-edges to keep. With the polygons comes the half-edge ``(C',)`` that each of theirs was.
     """
+    was = np.arange(len(polygons.vertices))
     while polygons.count > target:
         shapes = shapes_of(positions, polygons.vertices, polygons.sides)
         topology = polygons.topology(positions)
-        ends = _shared_chains(polygons, topology, creases)
+        ends = _shared_chains(polygons, topology, kept[was])
         if not len(ends[0]):
             break
         loops, sizes = _merged_loops(polygons, topology, *ends)
@@ -50,8 +51,8 @@ def merge(positions: Floats, polygons: Polygons, creases: Bools, limits: Limits,
         if not len(chosen):
             break
         polygons, half_edges = _replace(polygons, one[chosen], other[chosen], *_pick(loops, sizes, chosen))
-        creases = creases[half_edges]
-    return polygons, creases
+        was = was[half_edges]
+    return polygons, was
 
 
 def _shared_chains(polygons: Polygons, topology: Topology, creases: Bools) -> tuple[Ints, Ints, Ints]:
@@ -213,14 +214,8 @@ def _droppable(
     one, other = face[sides[0][good]], face[sides[1][good]]
     name = name[fine][good]
     chosen = _best_apart(gap, one, other, polygons.count)
-    first = np.sort(_first_of_each(name[chosen]))
+    first = first_of_each(name[chosen])
     return here[chosen[first]]
-
-
-def _first_of_each(keys: Ints) -> Ints:
-    """Index of the first of each set of equal keys."""
-    order = np.argsort(keys, kind="stable")
-    return order[np.diff(keys[order], prepend=-1) != 0]
 
 
 def _path_gap(positions: Floats, polygons: Polygons, topology: Topology, here: Ints) -> Floats:

@@ -9,7 +9,7 @@ from curvify.simplify.polygons import ranges, shapes_of
 from curvify.topology import Topology
 
 #: Cosine that a polygon must keep with itself, and the least sine of its corners, when one of its vertices moves.
-TURNED, THIN = 0.8, 0.05
+TURNED, THIN = 0.95, 0.05
 
 
 def corners_at(topology: Topology, vertices: Ints) -> tuple[Ints, Ints]:
@@ -20,9 +20,11 @@ def corners_at(topology: Topology, vertices: Ints) -> tuple[Ints, Ints]:
     return order[rows], which
 
 
-def keeps_shapes(positions: Floats, topology: Topology, vertices: Ints, targets: Ints) -> Bools:
+def keeps_shapes(
+    positions: Floats, topology: Topology, vertices: Ints, targets: Ints, left: float = np.inf
+) -> Bools:
     """Whether the polygons around each of ``vertices (n,)`` stay convex, turned as they were and no needles when it
-    takes the place of its vertex of ``targets (n,)``.
+    takes the place of its vertex of ``targets (n,)``; its old place must be nearer to their planes than ``left``.
 
     A polygon that has the target already loses a corner; one that then has only two is gone.
     """
@@ -41,6 +43,8 @@ def keeps_shapes(positions: Floats, topology: Topology, vertices: Ints, targets:
     new = shapes_of(positions, np.where(moves, head, loop)[kept], sizes[whole])
     fine = new.acceptable & (new.least_sines > np.minimum(THIN, old.least_sines[whole]))
     fine &= np.einsum("pi,pi->p", new.normals, old.normals[whole]) > TURNED
+    step = positions[vertices[which][whole]] - positions[targets[which][whole]]
+    fine &= np.abs(np.einsum("pi,pi->p", new.normals, step)) < left
     good = np.ones(len(vertices), dtype=bool)
     good[which[whole][~fine]] = False
     return good

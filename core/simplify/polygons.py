@@ -95,6 +95,25 @@ def ranges(starts: Ints, sizes: Ints) -> tuple[Ints, Ints]:
     return starts[which] + within, which
 
 
+def first_of_each(keys: Ints) -> Ints:
+    """Indices of the first of each set of equal keys, ascending."""
+    order = np.argsort(keys, kind="stable")
+    return np.sort(order[np.diff(keys[order], prepend=-1) != 0])
+
+
+def pillows(vertices: Ints, sizes: Ints) -> Ints:
+    """Loops of ``sizes (B,)`` on the very vertices of another one; each of a pair."""
+    first = np.cumsum(sizes) - sizes
+    found = [np.zeros(0, dtype=np.int64)]
+    for size in np.flatnonzero(np.bincount(sizes)):
+        rows = np.flatnonzero(sizes == size)
+        loops = np.sort(vertices[first[rows][:, None] + np.arange(size)], axis=1)
+        order = np.lexsort(loops.T)
+        same = (loops[order[1:]] == loops[order[:-1]]).all(axis=1)
+        found += [rows[order[1:][same]], rows[order[:-1][same]]]
+    return np.concatenate(found)
+
+
 def padded(loops: Ints, sizes: Ints) -> Ints:
     """Rows ``(m,B)`` of loops given one after the other; rows that a loop does not use repeat its first item."""
     first = np.cumsum(sizes) - sizes

@@ -12,17 +12,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from curvify.errors import OptionError
-from curvify.mesh import Bools, Ints
-from curvify.simplify.borders import SHARE, Tolerance
-from curvify.simplify.coarse import Drawn, draw
+from curvify.arrays import distinct
+from curvify.mesh import Ints
+from curvify.simplify.attempts import Attempt, Options, merge_stages, polygons_of, reduced
+from curvify.simplify.crossings import crosses_itself, crossing_polygons
 from curvify.simplify.decompose import Partition, polygonize
-from curvify.simplify.features import find_creases, sharp_half_edges
-from curvify.simplify.folds import unfold
-from curvify.simplify.merge import FREE, PRESSED, drop_vertices, merge
-from curvify.simplify.polygons import Polygons
+from curvify.simplify.features import find_creases
+from curvify.simplify.merge import FREE
 from curvify.simplify.regions import bisect
-from curvify.simplify.slide import slide_vertices
 from curvify.simplify.triangles import Triangles, face_components
 from curvify.simplify.vsa import COMPACT_SWEEPS, SWEEPS, Metric, cluster, exchange
 from curvify.words import count_of
@@ -39,94 +36,12 @@ STIFF = 0.98
 CLOSEST = 0.05
 #: Fewer regions must bring at least this much: below lies what topology and creases ask for.
 FLOOR = 0.9
-#: How far borders may leave their chords, as shares of the size of a polygon: on creases and boundaries, and elsewhere.
-SHARP_TOLERANCE, SMOOTH_TOLERANCE = 0.12, 0.4
-#: How far dropping a vertex of a crease or a boundary may move that, as a share of the same.
-DROP_TOLERANCE = 0.012
 #: The count asked for is met within this share.
 CLOSE = 0.05
-#: The share of cuts at folds that may come on top of the number wanted; how often merging is tried to make up for more.
-FOLD_SHARE, FOLD_ROUNDS = 0.04, 4
+#: How often regions of polygons that cross are halved.
+UNTANGLING = 3
 
 Progress = Callable[[str, float], None]
-
-
-@dataclass(frozen=True)
-class Options:
-    """What simplifying does.
-
-    ``faces`` polygons wanted, or ``proxies`` regions with as many polygons as they take; ``compactness`` the weight of
-    short regions against flat ones, 0 for pure variational shape approximation; ``sharp_angle`` in degrees from which
-    edges of the dense mesh are sharp; ``split_rule`` and ``weld`` as for refining.
-    """
-
-    faces: int | None = None
-    proxies: int | None = None
-    compactness: float = 4.0
-    sharp_angle: float = 30.0
-    split_rule: str = "best"
-    weld: str = "auto"
-
-    def __post_init__(self) -> None:
-        if (self.faces is None) == (self.proxies is None):
-            raise OptionError("give either the number of faces or the number of proxies")
-        if any(number is not None and number < 1 for number in (self.faces, self.proxies)):
-            raise OptionError("at least 1 face or proxy must be asked for")
-        if not self.compactness >= 0:
-            raise OptionError(f"the compactness must be 0 or more, not {self.compactness}")
-        if not 0 < self.sharp_angle <= 180:
-            raise OptionError(f"the sharp angle must be between 0 and 180 degrees, not {self.sharp_angle}")
-
-
-@dataclass(eq=False)
-class Attempt:
-    """Polygons from regions ``labels``; ``unmerged`` those before merging, ``drop`` how far dropping vertices may move
-    creases. ``drawn`` is the mesh that they make, with the cuts at folds.
-    """
-
-    polygons: Polygons
-    creases: Bools
-    labels: Ints
-    unmerged: Polygons
-    sharp: Bools
-    tolerance: Tolerance
-    drop: float
-    drawn: Drawn
-
-    @property
-    def count(self) -> int:
-        """Polygons of the mesh."""
-        return self.drawn.polygons.count
-
-    @property
-    def extra(self) -> int:
-        """How many of them the cuts at folds have made."""
-        return self.count - self.polygons.count
-
-    def against(self, wanted: int) -> int:
-        """Polygons to hold against the number wanted, which a few cuts at folds may exceed."""
-        return self.polygons.count + max(self.extra - int(FOLD_SHARE * wanted), 0)
-
-    def merged(self, dense: Triangles, polygons: Polygons, creases: Bools) -> Attempt:
-        """The same with other polygons on its regions."""
-        return replace(self, polygons=polygons, creases=creases, drawn=unfolded(dense, self.labels, polygons, creases))
-
-
-def unfolded(dense: Triangles, labels: Ints, polygons: Polygons, creases: Bools) -> Drawn:
-    """The mesh of the polygons, cut where patches would fold."""
-    drawn = draw(dense, labels, polygons, creases)
-    done = unfold(drawn.mesh)
-    return drawn.changed(done.mesh, done.corners, done.diagonals, done.vertices)
-
-
-def as_they_are(dense: Triangles, metric: Metric, options: Options) -> Attempt:
-    """Every triangle a polygon."""
-    labels = np.arange(dense.face_count)
-    sharp, tolerance = sharp_half_edges(dense, options.sharp_angle), Tolerance(0.0, 0.0)
-    polygons = polygonize(Partition(dense, metric, sharp, tolerance, options.split_rule, labels))
-    creases = find_creases(dense, metric, labels, polygons)
-    drawn = draw(dense, labels, polygons, creases)
-    return Attempt(polygons, creases, labels, polygons, sharp, tolerance, 0.0, drawn)
 
 
 @dataclass(eq=False)
@@ -216,6 +131,22 @@ def find_polygons(
     dense: Triangles, metric: Metric, options: Options, notes: list[str], tell: Progress
 ) -> Attempt:
     """Polygons as the options ask for; where their number cannot be had, that is said in ``notes``."""
+    attempt = _found(dense, metric, options, tell)
+    tell("crossings", 0.92)
+    attempt = _untangled(dense, metric, attempt, options)
+    wanted = options.faces
+    if wanted is not None and attempt.count > (1 + CLOSE) * wanted:
+        notes.append(
+            f"{count_of(wanted, 'face')} cannot hold this mesh's topology and creases; "
+            f"{attempt.count:,} are the fewest found"
+        )
+    elif wanted is not None and attempt.count < (1 - CLOSE) * wanted:
+        notes.append(f"{count_of(attempt.count, 'face')} hold everything; more would add nothing")
+    return attempt
+
+
+def _found(dense: Triangles, metric: Metric, options: Options, tell: Progress) -> Attempt:
+    """Polygons as the options ask for, whether they cross or not."""
     if options.faces is None:
         labels = cluster(dense, metric, options.proxies or 1, face_components(dense))
         labels = compacted(dense, metric, labels, options)
@@ -223,7 +154,32 @@ def find_polygons(
     best = Search(dense, metric, options, options.faces, tell).run()
     if best.against(options.faces) < options.faces:
         best = _fill(dense, metric, best, options, options.faces)
-    return _reduce(dense, best, options.faces, notes)
+    return reduced(dense, best, options.faces)
+
+
+def _untangled(dense: Triangles, metric: Metric, attempt: Attempt, options: Options) -> Attempt:
+    """The attempt with fewer crossings, if halving the regions of polygons that cross others gives that.
+
+    Not where the dense mesh crosses itself: then its polygons must.
+    """
+    crossing = crossing_polygons(attempt.drawn.mesh)
+    if not len(crossing) or crosses_itself(dense):
+        return attempt
+    for _ in range(UNTANGLING):
+        polygons = attempt.drawn.polygons
+        touched = np.isin(np.repeat(np.arange(polygons.count), polygons.sides), crossing)
+        labels = bisect(dense, attempt.labels, distinct(polygons.regions[touched])[0])
+        wanted = options.faces or int(attempt.labels.max()) + 1
+        other = polygons_of(dense, metric, labels, options, wanted, attempt.loose)
+        if options.faces is not None:
+            other = reduced(dense, other, options.faces)
+        left = crossing_polygons(other.drawn.mesh)
+        if len(left) >= len(crossing):
+            break
+        attempt, crossing = other, left
+        if not len(crossing):
+            break
+    return attempt
 
 
 def _fill(dense: Triangles, metric: Metric, attempt: Attempt, options: Options, wanted: int) -> Attempt:
@@ -243,7 +199,7 @@ def _fill(dense: Triangles, metric: Metric, attempt: Attempt, options: Options, 
         partition = Partition(dense, metric, attempt.sharp, attempt.tolerance, options.split_rule, labels)
         whole, labels = polygonize(partition), partition.labels
     creases = find_creases(dense, metric, labels, whole)
-    polygons, creases = merge(dense.positions, whole, creases, FREE, wanted)
+    polygons, creases = merge_stages(dense, labels, whole, creases, (FREE,), wanted, 0.0)
     return replace(attempt, labels=labels).merged(dense, polygons, creases)
 
 
@@ -252,52 +208,3 @@ def compacted(dense: Triangles, metric: Metric, labels: Ints, options: Options) 
     if options.compactness > 0:
         return exchange(dense, metric.compact(labels, options.compactness), labels, COMPACT_SWEEPS)
     return exchange(dense, metric, labels, SWEEPS)
-
-
-def polygons_of(
-    dense: Triangles, metric: Metric, labels: Ints, options: Options, wanted: int, loose: float = 1.0
-) -> Attempt:
-    """Polygons from regions: made discs, cut, mended, merged where that costs nothing.
-
-    ``wanted`` polygons set the tolerance for borders, ``loose`` is a factor on that.
-    """
-    size = float(np.sqrt(dense.areas.sum() / wanted))
-    tolerance = Tolerance(loose * SHARP_TOLERANCE * size, loose * SMOOTH_TOLERANCE * size, min(SHARE * loose, 0.7))
-    sharp = sharp_half_edges(dense, options.sharp_angle)
-    partition = Partition(dense, metric, sharp, tolerance, options.split_rule, labels)
-    whole = polygonize(partition)
-    creases = find_creases(dense, metric, partition.labels, whole)
-    polygons, creases = merge(dense.positions, whole, creases, FREE, 1)
-    drop = loose * DROP_TOLERANCE * size
-    polygons, creases = drop_vertices(dense.positions, polygons, creases, drop)
-    polygons = slide_vertices(dense.positions, polygons, creases)
-    drawn = unfolded(dense, partition.labels, polygons, creases)
-    return Attempt(polygons, creases, partition.labels, whole, sharp, tolerance, drop, drawn)
-
-
-def _reduce(dense: Triangles, attempt: Attempt, wanted: int, notes: list[str]) -> Attempt:
-    """Merge down to the number wanted, cuts at folds included."""
-    for _ in range(FOLD_ROUNDS):
-        had = attempt.polygons.count
-        surplus = attempt.against(wanted) - wanted
-        if surplus > 0:
-            attempt = _pressed(dense, attempt, had - surplus)
-        if attempt.polygons.count == had:
-            break
-    if attempt.count > (1 + CLOSE) * wanted:
-        notes.append(
-            f"{count_of(wanted, 'face')} cannot hold this mesh's topology and creases; "
-            f"{attempt.count:,} are the fewest found"
-        )
-    elif attempt.count < (1 - CLOSE) * wanted:
-        notes.append(f"{count_of(attempt.count, 'face')} hold everything; more would add nothing")
-    return attempt
-
-
-def _pressed(dense: Triangles, attempt: Attempt, target: int) -> Attempt:
-    """Merge down to a number of polygons before cuts, as gently as can be."""
-    polygons, creases = attempt.polygons, attempt.creases
-    for limits in PRESSED:
-        polygons, creases = merge(dense.positions, polygons, creases, limits, max(target, 1))
-    polygons, creases = drop_vertices(dense.positions, polygons, creases, attempt.drop)
-    return attempt.merged(dense, slide_vertices(dense.positions, polygons, creases), creases)

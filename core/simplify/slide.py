@@ -12,7 +12,7 @@ import numpy as np
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import sum_by, unit
 from curvify.simplify.moves import apart, corners_at, keeps_shapes
-from curvify.simplify.polygons import Polygons, ranges, shapes_of
+from curvify.simplify.polygons import Polygons, first_of_each, ranges, shapes_of
 from curvify.topology import Topology
 
 #: Corners with a sine below the first want room, and have it from the second on (8 and 12 degrees).
@@ -58,7 +58,7 @@ def _slides(positions: Floats, polygons: Polygons, topology: Topology, creases: 
     near = near[_gives_room(positions, topology, normals, vertices[along[near]], target[near])]
     near = near[keeps_shapes(positions, topology, vertices[along[near]], target[near])]
     near = near[np.lexsort((along[near], far[near]))]
-    near = near[_first_of_each(vertices[along[near]])]
+    near = near[first_of_each(vertices[along[near]])]
     chosen = near[apart(topology, vertices[along[near]])]
     return along[chosen], steps[chosen]
 
@@ -76,12 +76,6 @@ def _gives_room(positions: Floats, topology: Topology, normals: Floats, vertices
     corners, which = corners_at(topology, vertices)
     sines = _sines(positions, topology, corners, positions[targets][which], normals[vertices][which])
     return np.bincount(which, sines < ROOM, len(vertices)) == 0
-
-
-def _first_of_each(keys: Ints) -> Ints:
-    """Indices of the first of each set of equal keys, ascending."""
-    order = np.argsort(keys, kind="stable")
-    return np.sort(order[np.diff(keys[order], prepend=-1) != 0])
 
 
 def _slid(polygons: Polygons, topology: Topology, along: Ints, steps: Ints) -> Polygons:

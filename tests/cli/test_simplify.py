@@ -44,7 +44,7 @@ def test_normals_and_marks_are_written(call, folder, suffix):
 def test_the_report_tells_how_far_polygons_and_surface_are(call, torus):
     result = call("simplify", torus, "few.obj", "--faces", 40, "--report", "-")
     report = json.loads(result.out)
-    assert report["counts"]["faces"] == 40
+    assert report["counts"]["faces"] == pytest.approx(40, rel=0.05)
     assert report["counts"]["triangles"] == 1024
     assert 0 < report["distances"]["refined"]["rms"] < report["distances"]["flat"]["rms"] < 0.05
 

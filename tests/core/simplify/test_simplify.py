@@ -21,7 +21,10 @@ MESHES = {
     "sphere": (dense_meshes.sphere(12), 60),
     "torus": (dense_meshes.torus(), 80),
     "genus 3": (dense_meshes.plate(3, 4), 90),
+    "genus 8": (dense_meshes.plate(8, 2), 150),
     "sheet": (dense_meshes.sheet(), 50),
+    "holes": (dense_meshes.holed_sheet(), 60),
+    "part": (dense_meshes.prism(), 30),
     "two parts": (dense_meshes.boxes(np.array([[[1]], [[0]], [[1]]], dtype=bool), 4), 12),
     "needles": (dense_meshes.needles(), 60),
     "pinched": (dense_meshes.pinched(), 40),
@@ -116,6 +119,25 @@ def test_boundaries_keep_their_corners():
     result = simplify(dense_meshes.sheet(height=lambda x, y: 0 * x), Options(faces=1))
     assert result.mesh.face_count == 1
     assert {tuple(p) for p in result.mesh.positions[:, :2]} == {(0, 0), (0, 1), (1, 0), (1, 1)}
+
+
+def test_the_facets_of_a_part_come_back_as_they_are():
+    """16 sides and 2 caps, each several triangles in one plane: told, so that no normal may lean."""
+    result = simplify(dense_meshes.prism(), Options(faces=18))
+    assert result.mesh.face_count == 18
+    assert len(result.mesh.marks.flat_faces) == 18
+    found = accuracy(result.mesh, result.dense, 4000)
+    assert found["flat"].max < 1e-12
+    assert found["refined"].max < 1e-12
+
+
+def test_a_flat_part_that_runs_into_a_curve_stays_flat():
+    """Half of a sheet is flat and the other half rolls up without a crease between."""
+    sheet = dense_meshes.sheet(40, height=lambda x, y: np.where(x > 0.5, (x - 0.5) ** 2, 0.0))
+    result = simplify(sheet, Options(faces=30))
+    dense = curvify.refine(result.mesh, level=4)
+    inner = dense.positions[:, 0] < 0.45
+    assert np.abs(dense.positions[inner, 2]).max() < 2e-3
 
 
 def test_as_many_faces_as_there_are_leave_the_triangles():
