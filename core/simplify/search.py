@@ -160,7 +160,7 @@ def _found(dense: Triangles, metric: Metric, options: Options, tell: Progress) -
 def _untangled(dense: Triangles, metric: Metric, attempt: Attempt, options: Options) -> Attempt:
     """The attempt with fewer crossings, if halving the regions of polygons that cross others gives that.
 
-    Not where the dense mesh crosses itself: then its polygons must.
+    Not for more polygons than are wanted, and not where the dense mesh crosses itself: then its polygons must.
     """
     crossing = crossing_polygons(attempt.drawn.mesh)
     if not len(crossing) or crosses_itself(dense):
@@ -174,7 +174,8 @@ def _untangled(dense: Triangles, metric: Metric, attempt: Attempt, options: Opti
         if options.faces is not None:
             other = reduced(dense, other, options.faces)
         left = crossing_polygons(other.drawn.mesh)
-        if len(left) >= len(crossing):
+        too_many = options.faces is not None and other.count > max((1 + CLOSE) * options.faces, attempt.count)
+        if len(left) >= len(crossing) or too_many:
             break
         attempt, crossing = other, left
         if not len(crossing):

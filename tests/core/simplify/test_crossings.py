@@ -6,7 +6,7 @@ import numpy as np
 
 import dense_meshes
 from curvify.mesh import PolygonMesh
-from curvify.simplify import Options, simplify
+from curvify.simplify import Options, search, simplify
 from curvify.simplify.crossings import crosses_itself, crossing_polygons
 from curvify.simplify.triangles import prepare_triangles
 
@@ -40,13 +40,24 @@ def test_what_crosses_before_and_after_is_told():
     assert simplify(two_tori(4.0), Options(faces=120)).counts["crossings"] == 0
 
 
-def test_polygons_between_which_a_gap_is_thin_are_taken_apart():
-    """Two spheres, one inside the other with little room between: few polygons of one would cut the other."""
+def thin_shell() -> PolygonMesh:
+    """A sphere in a sphere, with so little room between that few polygons of one cut the other."""
     outer = dense_meshes.sphere(12)
     triangles = outer.face_vertices.reshape(-1, 3)
     points = np.concatenate([outer.positions, 0.9 * outer.positions])
-    shell = dense_meshes.mesh_of(points, np.concatenate([triangles, triangles[:, ::-1] + outer.vertex_count]))
-    assert not crosses_itself(prepare_triangles(shell)[0])
-    result = simplify(shell, Options(faces=40))
-    crossings = result.counts["crossings"]
-    assert crossings == 0 or "polygons cross" in " ".join(result.warnings)
+    return dense_meshes.mesh_of(points, np.concatenate([triangles, triangles[:, ::-1] + outer.vertex_count]))
+
+
+def test_regions_of_polygons_that_cross_are_halved(monkeypatch):
+    assert not crosses_itself(prepare_triangles(thin_shell())[0])
+    assert simplify(thin_shell(), Options(proxies=48)).counts["crossings"] == 0
+    monkeypatch.setattr(search, "UNTANGLING", 0)
+    assert simplify(thin_shell(), Options(proxies=48)).counts["crossings"] > 0
+
+
+def test_the_number_wanted_goes_before_crossings_and_those_are_told():
+    result = simplify(thin_shell(), Options(faces=60))
+    assert result.mesh.face_count <= 60 * (1 + search.CLOSE)
+    assert result.counts["crossings"] > 0
+    assert [text for text in result.warnings if text.startswith("polygons cross each other in")]
+    assert "so does the input" not in " ".join(result.warnings)
