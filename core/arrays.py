@@ -38,9 +38,12 @@ def ranking(keys: Ints) -> Ints:
     bits = len(keys).bit_length()
     if not len(keys) or keys.min() < 0 or int(keys.max()).bit_length() + bits > 63:
         return np.argsort(keys, kind="stable")
-    packed = (keys.astype(np.int64) << bits) | np.arange(len(keys))
+    packed = keys.astype(np.int64)
+    packed <<= bits
+    packed |= np.arange(len(keys))
     packed.sort()
-    return packed & ((1 << bits) - 1)
+    packed &= (1 << bits) - 1
+    return packed
 
 
 def values_of(small: Ints) -> list[int]:

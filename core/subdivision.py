@@ -1,8 +1,8 @@
 """Recursive schemes to a dense mesh: passes in memory, the last one block by block into the sink.
 
 The last pass makes three quarters of the vertices. Its blocks depend on nothing but the mesh before it, so that is all
-that is ever held; where a pass needs its own result (normals from geometry, edges that stop at a length) or is the only
-one over polygons, the result is held instead.
+that is ever held; besides, where normals come from the new triangles, or edges stop at a length, the new vertices.
+Where the only pass is one over polygons, its result is held instead.
 """
 
 from __future__ import annotations
@@ -22,14 +22,12 @@ from curvify.mesh import Floats
 from curvify.refinement import JobsFor, Refinable
 from curvify.sampling import segments
 from curvify.schemes.overveld import MOST_PASSES, Recursion
-from curvify.schemes.overveld_pass import Rules, Triangles, corner_wedges, middle_wedges, middles, subdivide, template
+from curvify.schemes.overveld_children import Pass, begin_pass
+from curvify.schemes.overveld_pass import WINDOW, Triangles, windows
 from curvify.schemes.overveld_polygons import subdivide_polygons
 from curvify.sinks import DenseLayout, Sink
 from curvify.threads import Job
 from curvify.topology import Topology
-
-#: Vertices or faces in one job.
-WINDOW = 1 << 15
 
 
 class Subdivision(Refinable):
@@ -41,6 +39,7 @@ class Subdivision(Refinable):
     def __init__(self, recursion: Recursion, scheme: str) -> None:
         self.recursion, self.scheme, self.warnings = recursion, scheme, list(recursion.warnings)
         self._latest: tuple[int, Triangles] | None = None  # passes done, and the mesh after them
+        self._begun: Pass | None = None  # the next one, where it is known
 
     @property
     def positions(self) -> Floats:
@@ -85,15 +84,8 @@ class Subdivision(Refinable):
             sizes = self.recursion.polygons.topology.sizes
             first = int(np.where(sizes == 3, 4, np.where(sizes == 4, 8, 4 * sizes)).sum())
             return first * 4 ** (self.depth(level) - 1)
-        while True:
-            done, mesh = self._reached(1)
-            if done >= self.depth(level):
-                return len(mesh.faces)
-            split = self.recursion.options.rules.split(mesh.positions, mesh.edges)
-            count = len(mesh.faces) + int(split[mesh.face_edges].sum())
-            if count == len(mesh.faces) or (enough is not None and count > enough):
-                return count
-            self._reached(done + 1)
+        step = self._last_pass(self.depth(level), enough)
+        return len(self._reached(0)[1].faces) if step is None else step.face_count
 
     def _reached(self, passes: int) -> tuple[int, Triangles]:
         """The mesh after at least so many passes, or as many as there are; how many those are."""
@@ -103,11 +95,29 @@ class Subdivision(Refinable):
             first = None if whole is None else (0, whole)
             self._latest = first or (1, subdivide_polygons(polygons, options.rules, options.apex))
         while self._latest[0] < passes:
-            finer = subdivide(self._latest[1], options.rules)
-            if finer is None:
+            step = begin_pass(self._latest[1], options.rules)
+            if step is None:
                 break
-            self._latest = (self._latest[0] + 1, finer)
+            self._latest = (self._latest[0] + 1, step.children())
+            del step
         return self._latest
+
+    def _last_pass(self, depth: int, enough: int | None = None) -> Pass | None:
+        """The last pass, held, where edges stop at a length: the one of number ``depth``, or that after which no edge
+        is longer; some pass that makes more than ``enough`` faces. None where the mesh that was reached is finished.
+        """
+        while True:
+            done, mesh = self._reached(0)
+            if done >= depth:
+                return None
+            step = self._begun or begin_pass(mesh, self.recursion.options.rules)
+            if step is None or (enough is not None and step.face_count > enough):
+                return step
+            self._begun = step if step.positions is not None else step.hold()
+            if done + 1 == depth or step.is_last():
+                return step
+            self._begun, self._latest = None, (done + 1, step.children())
+            del step, mesh  # the mesh before is not held while the next pass begins
 
     def open_backend(self, name: str, samples: int) -> AbstractContextManager[Backend]:
         """The CPU, whatever the size. Raises OptionError for another backend: nothing here is a table."""
@@ -118,49 +128,55 @@ class Subdivision(Refinable):
     def _work(self, level: int, dtype: np.dtype[Any]) -> tuple[DenseLayout, JobsFor]:
         """Layout and jobs of the dense mesh; they are the same for any backend."""
         options, depth = self.recursion.options, self.depth(level)
-        held = options.max_edge is not None or options.midpoint_normal == "geometry"
-        if self._latest is not None and self._latest[0] > depth - (not held):
-            self._latest = None
-        done, mesh = self._reached(depth if held else depth - 1)
-        record = vertex_type(self.recursion.mesh, self.recursion.has_uvs, dtype)
-        work = _Blocks(mesh, None if held or done == depth else options.rules, record)
+        if self._latest is not None and self._latest[0] > depth:
+            self._latest = self._begun = None
+        if options.max_edge is not None:
+            step = self._last_pass(depth)
+        else:
+            done, mesh = self._reached(depth - 1)
+            step = begin_pass(mesh, options.rules) if done < depth else None
+            if step is not None and options.midpoint_normal == "geometry":
+                step.hold()
+        work = _Blocks(self._reached(0)[1], step, vertex_type(self.recursion.mesh, self.recursion.has_uvs, dtype))
         layout = DenseLayout(
-            work.vertex_count, work.repeats, work.face_count, self.cell_size, record, self.recursion.mesh
+            work.vertex_count, work.repeats, work.face_count, self.cell_size, work.record, self.recursion.mesh
         )
         return layout, lambda backend: work.jobs()
 
 
 class _Blocks:
-    """The blocks of a dense mesh: those of ``mesh``, or of what one more pass with ``last`` rules makes of it."""
+    """The blocks of a dense mesh: those of ``mesh``, or of what its ``last`` pass makes of it."""
 
-    def __init__(self, mesh: Triangles, last: Rules | None, record: np.dtype[Any]) -> None:
+    def __init__(self, mesh: Triangles, last: Pass | None, record: np.dtype[Any]) -> None:
         self.mesh, self.last, self.record = mesh, last, record
         self.before = len(mesh.positions)
-        self.plain = len(mesh.edges) if last else 0
+        self.plain = len(last.rows) if last else 0
         self.vertex_count = self.before + self.plain
-        self.per_face = 4 if last else 1
-        self.face_count = len(mesh.faces) * self.per_face
-        self.repeats = mesh.repeats
-        if last:
-            self.sides = mesh.sides()
-            numbers, first = self.before + np.arange(self.plain), self.vertex_count + len(mesh.repeats)
-            self.extra = middle_wedges(mesh.positions, mesh.values, mesh.edges, self.sides, numbers, first, last)
-            self.repeats = np.concatenate([mesh.repeats, numbers[self.extra.repeated]])
+        self.repeats = last.repeats if last else mesh.repeats
+        counts = [len(mesh.faces[part]) if last is None else int(last.face_counts(part).sum()) for part in self.parts]
+        self.face_starts = np.cumsum([0, *counts])
+        self.face_count = int(self.face_starts[-1])
+
+    @property
+    def parts(self) -> list[slice]:
+        """The faces of each job."""
+        return list(windows(len(self.mesh.faces)))
 
     def jobs(self) -> list[tuple[int, Job]]:
         """All jobs in the order of the file, each with its number of samples."""
         jobs: list[tuple[int, Job]] = []
 
-        def add(job: Callable[[int, int, Sink], None], begin: int, end: int, samples: int = 1) -> None:
+        def add(job: Callable[[int, int, Sink], None], begin: int, end: int) -> None:
             for first in range(begin, end, WINDOW):
                 last = min(first + WINDOW, end)
-                jobs.append(((last - first) * samples, partial(job, first, last)))
+                jobs.append((last - first, partial(job, first, last)))
 
         add(self.old, 0, self.before)
         add(self.middles, 0, self.plain)
         add(self.old, self.before, len(self.mesh.values))
-        add(self.others, 0, len(self.extra.kept) if self.last else 0)
-        add(self.faces, 0, len(self.mesh.faces), self.per_face)
+        add(self.others, 0, len(self.last.extra.kept) if self.last else 0)
+        for part, count, start in zip(self.parts, np.diff(self.face_starts), self.face_starts, strict=False):
+            jobs.append((int(count), partial(self.faces, part, int(start))))
         return jobs
 
     def old(self, begin: int, end: int, sink: Sink) -> None:
@@ -172,17 +188,15 @@ class _Blocks:
     def middles(self, begin: int, end: int, sink: Sink) -> None:
         """The middles of edges."""
         assert self.last is not None
-        mesh, rows = self.mesh, np.arange(begin, end)
-        position, values = middles(mesh.positions, mesh.values, mesh.edges, self.sides, rows, self.last)
-        sink.vertices(self.before + begin, self._records(position, values))
+        sink.vertices(self.before + begin, self._records(*self.last.middles(slice(begin, end))))
 
     def others(self, begin: int, end: int, sink: Sink) -> None:
         """The middles of edges once more, for their other sides."""
         assert self.last is not None
-        mesh, edges = self.mesh, self.extra.repeated[begin:end]
-        position, _ = middles(mesh.positions, mesh.values, mesh.edges, self.sides, edges, self.last)
-        start = self.vertex_count + len(mesh.repeats) + begin
-        sink.vertices(start, self._records(position, self.extra.values[begin:end]))
+        extra, numbers = self.last.extra, self.last.numbers
+        positions, _ = self.last.middles(numbers[extra.repeated[begin:end]] - self.before)
+        start = self.vertex_count + len(self.mesh.repeats) + begin
+        sink.vertices(start, self._records(positions, extra.values[begin:end]))
 
     def _records(self, positions: Floats, values: Floats) -> np.ndarray[Any, Any]:
         records = np.empty(len(positions), dtype=self.record)
@@ -194,12 +208,9 @@ class _Blocks:
             column += width
         return records
 
-    def faces(self, first: int, last: int, sink: Sink) -> None:
-        """Triangles of the faces first to last."""
-        mesh = self.mesh
-        source = np.repeat(mesh.source_faces[first:last], self.per_face)
-        wedges = mesh.wedges[first:last]
+    def faces(self, part: slice, start: int, sink: Sink) -> None:
+        """The triangles that some faces become, from number ``start`` on."""
+        wedges, source = self.mesh.wedges[part], self.mesh.source_faces[part]
         if self.last:
-            nodes = corner_wedges(mesh, self.sides, self.extra.of_sides, self.plain, slice(first, last))
-            wedges = nodes[:, template(7).nodes].reshape(-1, 3)
-        sink.faces(first * self.per_face, wedges, source)
+            wedges, source = self.last.triangles(part)[1], np.repeat(source, self.last.face_counts(part))
+        sink.faces(start, wedges, source)

@@ -15,15 +15,16 @@ from curvify.arrays import cross, distinct, values_of
 from curvify.mesh import Bools, Floats, Ints
 from curvify.normals import dot, unit
 from curvify.records import record
+from curvify.schemes.overveld_cuts import cuts
 from curvify.schemes.overveld_pass import (
     EdgeSides,
+    FaceNormals,
     Rules,
     Triangles,
-    cuts,
     edge_sides,
     middle_wedges,
     middles,
-    normals_from_faces,
+    plain_sides,
     solve_sides,
 )
 from curvify.topology import Topology, canonical_direction
@@ -57,13 +58,13 @@ class Polygons:
             self.positions, self.values, self.repeats, faces, wedges, edges, topology.edges, self.source_faces
         )
 
-
-
     def sides(self) -> EdgeSides:
         """The sides of the edges."""
         topology = self.topology
+        if not len(self.repeats):
+            return plain_sides(topology.edges, topology.edge)
         heads = self.wedges[topology.next]
-        return edge_sides(topology.edges, topology.edge, topology.vertices, self.wedges, heads, not len(self.repeats))
+        return edge_sides(topology.edges, topology.edge, topology.vertices, self.wedges, heads)
 
 
 class _Numbers(NamedTuple):
@@ -102,7 +103,10 @@ def subdivide_polygons(mesh: Polygons, rules: Rules, apex: float) -> Triangles:
     edges = canonical_direction(positions, np.stack(np.divmod(keys, numbers.total), axis=1))
     result = Triangles(positions, values, repeats, faces, wedges, edge.reshape(-1, 3), edges, source)
     if rules.midpoint_normal == "geometry":
-        normals_from_faces(result, before, len(mesh.repeats))
+        sums = FaceNormals(len(values))
+        sums.add(positions, faces, wedges)
+        sums.store(values[before : numbers.total], before)
+        sums.store(values[first:], first)
     return result
 
 
@@ -135,7 +139,7 @@ def _insides(
     topology = mesh.topology
     every = np.arange(len(topology.edges))
     curves = solve_sides(mesh.positions, mesh.values, topology.edges, sides, every, rules.edge_rule)[0]
-    first, second = curves.controls()
+    first, second = (np.ascontiguousarray(points) for points in curves.controls())
     forward = topology.forward[:, None]
     out = np.where(forward, first[topology.edge], second[topology.edge])
     back = np.where(forward, second[topology.edge], first[topology.edge])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,8 @@ import curvify
 from curvify.errors import LimitError, MeshError, OptionError
 from curvify.mesh import DenseMesh, PolygonMesh
 from curvify.refinement import Refinable, refinable
+from curvify.schemes.overveld_cuts import template
 from curvify.schemes.overveld_edges import EdgeCurves, middle_normals, solve_creases, solve_edges
-from curvify.schemes.overveld_pass import template
 from curvify.sinks import ArraySink, DenseLayout
 from surfaces import (
     Array,
@@ -482,3 +483,43 @@ def test_there_is_no_surface_to_evaluate() -> None:
 def test_options_that_cannot_be_are_refused(options: dict[str, Any], message: str) -> None:
     with pytest.raises(OptionError, match=message):
         refined(cube(), **options)
+
+
+# --- memory -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "times"),
+    [({"depth": 5}, 1.5), ({"depth": 5, "midpoint_normal": "geometry"}, 2.5), ({"max_edge": 0.01}, 4.5)],
+    ids=["plain", "geometry", "max-edge"],
+)
+def test_memory_is_a_small_multiple_of_the_file(options: dict[str, Any], times: float, tmp_path: Path) -> None:
+    """Beside the work arrays of a stretch, the mesh before the last pass and what that needs of itself."""
+    made = refinable(torus(30, 15), "overveld", **options)
+    path = tmp_path / "dense.ply"
+    tracemalloc.start()
+    try:
+        made.write(path, threads=1)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert path.stat().st_size > 8 << 20
+    assert peak < times * path.stat().st_size + (16 << 20)
+
+
+@pytest.mark.parametrize("geometry", [False, True])
+def test_one_more_pass_gives_what_was_held(geometry: bool) -> None:
+    """The last pass goes into the sink block by block; a pass later the same mesh is one that is held."""
+    options = {"midpoint_normal": "geometry"} if geometry else {}
+    streamed = refinable(mixed_ball(), "overveld", depth=3, sharp_angle=30, **options).refine()
+    made = refinable(mixed_ball(), "overveld", depth=4, sharp_angle=30, **options)
+    held = made._reached(3)[1]  # type: ignore[attr-defined]
+    assert np.array_equal(held.positions, streamed.positions)
+    assert np.array_equal(held.values[:, :3], streamed.normals)
+    assert np.array_equal(held.wedges, streamed.face_wedges)
+
+
+def test_edges_that_stop_are_counted_before_they_are_split() -> None:
+    made = refinable(mixed_ball(), "overveld", max_edge=0.1)
+    assert made.face_count(1, 100) > 100
+    assert made.face_count(1) == len(made.refine().faces) == len(made.refine(threads=1).faces)
