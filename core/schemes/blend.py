@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from curvify.arrays import values_of
+from curvify.arrays import cross, values_of
 from curvify.convex import Split, split_polygons, whole_faces
 from curvify.errors import OptionError
 from curvify.mesh import Bools, Floats, Ints, PolygonMesh
-from curvify.normals import unit
+from curvify.normals import dot, unit
 from curvify.options import MeshOptions
 from curvify.pieces import MAX_SIDES, split_notes
 from curvify.prepare import Coarse, prepare_mesh
@@ -24,7 +24,15 @@ from curvify.sampling import kite_sampling
 from curvify.schemes.base import PatchClass, Patches
 from curvify.schemes.blend_charts import CURVE, POINT, Charts, find_rings, make_charts, sector_kinds, smooth_kinds
 from curvify.schemes.blend_fit import fit_paper_curves, fit_sectors, fit_smooth, soften
-from curvify.schemes.blend_lines import FeatureMarks, Lines, end_curves, find_lines, line_tangents, start_ends
+from curvify.schemes.blend_lines import (
+    EndCurves,
+    FeatureMarks,
+    Lines,
+    end_curves,
+    find_lines,
+    line_tangents,
+    start_ends,
+)
 from curvify.schemes.blend_network import Network, blend_edges
 from curvify.schemes.frames import piece_topology
 from curvify.schemes.patchwork import assemble_patches
@@ -95,8 +103,8 @@ def prepare(mesh: PolygonMesh | Coarse, options: Options | None = None) -> Patch
 @record
 class BlendWork:
     """A mesh on its way to a surface: the pieces of its faces, ``split`` and their ``topology``; their ``lines``, the
-    ``lone (E,)`` creases without effect, and the ``network`` of quads; ``curves (2Q,3,3)`` of the features at the
-    quads' edge ends, NaN where none, or None; ``face_normals (C,3)`` of the coarse mesh at the corners of the pieces.
+    ``lone (E,)`` creases without effect, and the ``network`` of quads; ``curves`` of the features at the
+    quads' edge ends, or None; ``face_normals (C,3)`` of the coarse mesh at the corners of the pieces.
     """
 
     split: Split
@@ -104,7 +112,7 @@ class BlendWork:
     lines: Lines
     lone: Bools
     network: Network
-    curves: Floats | None
+    curves: EndCurves | None
     face_normals: Floats
 
 
@@ -187,7 +195,7 @@ def _divide(
 
 def fit_charts(
     quads: Quads, lines: Lines, sharpness: Floats, options: Options
-) -> tuple[Charts, Floats | None]:
+) -> tuple[Charts, EndCurves | None]:
     """Charts with their local geometries; and the curves of the features, where all faces beside them follow those.
 
     ``sharpness (V,)`` of the creases at the quads' vertices.
@@ -235,9 +243,9 @@ def corner_normals(work: BlendWork) -> Floats:
     charts, corners = work.network.charts, work.network.quads.kites[:, 0]
     chart = charts.rings.chart[corners]
     first, second = charts.coefficients[:, 3], charts.coefficients[:, 1]
-    normal = np.cross(first, second)
-    square = (normal**2).sum(axis=1)
-    none = ~(square > 1e-20 * (first**2).sum(axis=1) * (second**2).sum(axis=1))
+    normal = cross(first, second)
+    square, speeds = dot(normal, normal)[:, 0], dot(first, first)[:, 0] * dot(second, second)[:, 0]
+    none = ~(square > 1e-20 * speeds)
     own = np.zeros_like(normal)
     own[chart[::-1]] = work.face_normals[::-1]
     return unit(np.where(none[:, None], own, normal))[chart]

@@ -6,14 +6,14 @@ the chart's step. Source: Ko, Lee, Lim, Yoon, section III.1; polar charts and se
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from curvify.arrays import distinct, values_of
+from curvify.arrays import by_component, distinct, ranking, take_rows, values_of
 from curvify.mesh import Bools, Floats, Ints
 from curvify.records import record
-from curvify.schemes.blend_basis import turning
+from curvify.schemes.blend_basis import EXPONENTS, turning
 from curvify.schemes.blend_lines import start_ends
 from curvify.topology import Topology
 
@@ -72,7 +72,8 @@ def find_rings(topology: Topology, fans: Ints, cut: Bools) -> Rings:
     around = np.flatnonzero((chart < 0) & (fans == np.arange(len(cut))))
     _walk(steps, around, chart, place, len(begins))
     sizes = np.bincount(chart)
-    return Rings(np.concatenate([[0], np.cumsum(sizes)]), np.lexsort((place, chart)), chart, place)
+    order = ranking(chart * int(sizes.max(initial=1)) + place)
+    return Rings(np.concatenate([[0], np.cumsum(sizes)]), order, chart, place)
 
 
 def _walk(following: Ints, corners: Ints, chart: Ints, place: Ints, number: int) -> None:
@@ -103,11 +104,24 @@ class Charts:
     starts: Ints
     matrices: Floats
 
-    def at(self, corners: Ints, further: int = 0) -> Floats:
-        """Coefficients ``(...,9,3)`` in the coordinates of the faces at ``corners (...)``, ``further`` places on."""
+    def at(self, corners: Ints, further: int | Ints = 0, wanted: Sequence[int] = range(9)) -> Floats:
+        """The ``wanted`` coefficients ``(...,w,3)`` in the coordinates of the faces at ``corners (...)``, ``further``
+        places on.
+
+        Elementwise: a corner gets the same bits wherever it stands. A coefficient turns with those of its degree only.
+        """
         chart = self.rings.chart[corners]
-        turn = self.starts[self.families[chart]] + self.rings.place[corners] + further
-        return np.matmul(self.matrices[turn], self.coefficients[chart])
+        turn = (self.starts[self.families[chart]] + self.rings.place[corners] + further).reshape(-1)
+        chart = chart.reshape(-1)
+        own = by_component(take_rows(self.coefficients.reshape(-1, 27), chart)).T.reshape(9, 3, -1)
+        result = np.empty((len(wanted), 3, len(chart)))
+        for slot, into in enumerate(wanted):
+            a, b = EXPONENTS[into]
+            result[slot] = 0.0
+            for source, (i, j) in enumerate(EXPONENTS):
+                if i + j == a + b:
+                    result[slot] += self.matrices[:, into, source][turn] * own[source]
+        return result.transpose(2, 0, 1).reshape(*corners.shape, len(wanted), 3)
 
     def exponents_at(self, corners: Ints) -> Floats:
         """A and B ``(...,2)`` of the charts at corners."""

@@ -11,11 +11,12 @@ from functools import lru_cache
 
 import numpy as np
 
+from curvify.arrays import take_rows
 from curvify.mesh import Floats, Ints
 from curvify.normals import dot, unit
 from curvify.schemes.blend_basis import monomials
 from curvify.schemes.blend_charts import CONFORMAL, HALF, NARROW, OPENING, POLAR, WIDE, Charts
-from curvify.schemes.blend_lines import start_ends
+from curvify.schemes.blend_lines import EndCurves, start_ends
 from curvify.topology import Topology
 
 #: Coefficients by name: the monomial that each belongs to.
@@ -59,7 +60,9 @@ def neighbors(topology: Topology, positions: Floats, corners: Ints, closed: bool
     if not closed:
         edges = np.concatenate([edges, ids[topology.prev[corners[:, -1:]]]], axis=1)
     across = ids[topology.next[topology.next[corners]]]
-    return positions[np.concatenate([edges, across], axis=1)] - positions[ids[corners[:, :1]]]
+    ring = take_rows(positions, np.concatenate([edges, across], axis=1))
+    ring -= take_rows(positions, ids[corners[:, :1]])
+    return ring
 
 
 def fit_smooth(charts: Charts, topology: Topology, positions: Floats) -> None:
@@ -72,17 +75,17 @@ def fit_smooth(charts: Charts, topology: Topology, positions: Floats) -> None:
             charts.coefficients[some, 1:] = fitted[:, 1:]
 
 
-def fit_sectors(charts: Charts, topology: Topology, positions: Floats, curves: Floats) -> None:
-    """Fill in the coefficients of all sectors; ``curves (2E,3,3)`` of the features. Smooth charts come first."""
+def fit_sectors(charts: Charts, topology: Topology, positions: Floats, curves: EndCurves) -> None:
+    """Fill in the coefficients of all sectors, from the ``curves`` of the features. Smooth charts come first."""
     for kind in (HALF, NARROW, WIDE):
         for some, corners in charts.rings.of(np.flatnonzero(charts.kinds == kind)):
             ring = neighbors(topology, positions, corners, closed=False)
             first = start_ends(topology)[corners[:, 0]]
             last = start_ends(topology)[topology.prev[corners[:, -1]]] ^ 1
             if kind == HALF:
-                fitted = _half_plane(charts, topology, corners, ring, curves[first])
+                fitted = _half_plane(charts, topology, corners, ring, curves.at(first))
             else:
-                fitted = _wedge(kind, ring, curves[first], curves[last])
+                fitted = _wedge(kind, ring, curves.at(first), curves.at(last))
             charts.coefficients[some, 1:] = fitted[:, 1:]
 
 
@@ -109,7 +112,7 @@ def _neighbors_bend(charts: Charts, topology: Topology, corners: Ints, points: F
     for i in range(1, faces):
         there = topology.twin[corners[:, i]]
         known = charts.smooth[charts.rings.chart[there]][:, None]
-        back = charts.at(there)[:, XX]
+        back = charts.at(there, wanted=[XX])[:, 0]
         x, y = points[i]
         total += np.where(known, (back - x * x * bend) * y * y, 0.0)
         weights += known * y**4

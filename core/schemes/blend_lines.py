@@ -164,9 +164,22 @@ def _pair_nonmanifold(lines: Lines, topology: Topology, positions: Floats, marks
     lines.partner[a[smooth]], lines.partner[b[smooth]] = b[smooth], a[smooth]
 
 
-def end_curves(topology: Topology, positions: Floats, partner: Ints, ends: Ints) -> Floats:
-    """Curves ``(2E,3,3)`` on which features leave their edge ends ``(n,)``: v + c1 t + c2 t^2 as (v, c1, c2); NaN at
-    all others.
+@record
+class EndCurves:
+    """Curves v + c1 t + c2 t^2 on which features leave their edge ends: ``values (n,3,3)`` as (v, c1, c2), and the
+    ``row (2E,)`` of each edge end, -1 for those that are no feature.
+    """
+
+    values: Floats
+    row: Ints
+
+    def at(self, ends: Ints) -> Floats:
+        """The curves ``(n,3,3)`` of features."""
+        return self.values[self.row[ends]]
+
+
+def end_curves(topology: Topology, positions: Floats, partner: Ints, ends: Ints) -> EndCurves:
+    """Curves on which features leave their edge ends ``(n,)``.
 
     Two that continue each other: the parabola through both neighbors. Otherwise straight, but for the bend that the
     other end has, if it continues a line there.
@@ -180,9 +193,9 @@ def end_curves(topology: Topology, positions: Floats, partner: Ints, ends: Ints)
     chord, paired = directions(topology, positions, ends), (partner[ends] >= 0)[:, None]
     bend = np.where(paired, bends(ends), bends(ends ^ 1))
     slope = np.where(paired, (chord - directions(topology, positions, partner[ends])) / 2, chord - bend)
-    result = np.full((len(partner), 3, 3), np.nan)
-    result[ends] = np.stack([positions[topology.edges.reshape(-1)[ends]], slope, bend], axis=1)
-    return result
+    row = np.full(len(partner), -1)
+    row[ends] = np.arange(len(ends))
+    return EndCurves(np.stack([positions[topology.edges.reshape(-1)[ends]], slope, bend], axis=1), row)
 
 
 def line_tangents(topology: Topology, positions: Floats, partner: Ints) -> Floats:

@@ -17,14 +17,12 @@ from curvify.records import record
 from curvify.schemes.base import Basis, Form, KiteForms, LinearControls, linear_basis
 from curvify.schemes.blend_basis import ACROSS, ALONG, COLUMNS, corner_jets, edge_jets, face_jets
 from curvify.schemes.blend_charts import Charts
-from curvify.schemes.blend_lines import start_ends
+from curvify.schemes.blend_lines import EndCurves, start_ends
 from curvify.schemes.quads import Quads
 from curvify.topology import Topology
 
 #: Squared sine below which the derivatives along and across an edge count as parallel.
 PARALLEL = 1e-20
-#: Corners whose coefficients are turned together.
-WINDOW = 1 << 14
 #: How far inside a face its normal is taken where its edge has none.
 NUDGE = 1e-4
 
@@ -88,15 +86,17 @@ def _kite_basis(
 class BlendEdges:
     """Edges of a blending surface; each is one or two edges of its quads.
 
-    ``rays (2Q,3,3)``: coefficients along each edge end of the quads, with the exponent A ``(2Q,)`` there; ``ends
-    (E,2p)`` the quads' edge ends that each edge passes, in canonical direction; ``half_edges (N,)`` the half-edge of
-    each normal field. ``corner_normals (C,3)``: unit normals of the faces' corners, for where the surface has none.
+    ``corners (2Q,)`` and ``further (2Q,)``: a corner at each edge end of the quads, and how many places on in its chart
+    the edge lies; ``curves`` of the features, if all faces there share them; ``ends (E,2p)`` the quads' edge ends that
+    each edge passes, in canonical direction; ``half_edges (N,)`` the half-edge of each normal field. ``corner_normals
+    (C,3)``: unit normals of the faces' corners, for where the surface has none.
     """
 
     network: Network
     topology: Topology
-    rays: Floats
-    exponents: Floats
+    corners: Ints
+    further: Ints
+    curves: EndCurves | None
     ends: Ints
     half_edges: Ints
     corner_normals: Floats
@@ -133,8 +133,13 @@ class BlendEdges:
 
     def _terms(self, ends: Ints, x: Floats) -> tuple[Floats, Floats]:
         """What the charts at edge ends ``(e,)`` add at the distance ``x`` from them: values and derivatives by x."""
-        values, slopes, _ = edge_jets(self.network.order, self.exponents[ends][:, None], x)
-        rays = np.moveaxis(self.rays[ends], -1, 0)
+        charts, corners = self.network.charts, self.corners[ends]
+        values, slopes, _ = edge_jets(self.network.order, charts.exponents_at(corners)[:, :1], x)
+        rays = charts.at(corners, self.further[ends], ALONG)
+        if self.curves is not None:
+            known = np.flatnonzero(self.curves.row[ends] >= 0)
+            rays[known] = self.curves.at(ends[known])
+        rays = np.moveaxis(rays, -1, 0)
         return _combine(rays, values), _combine(rays, slopes)
 
     def normals(self, fields: Ints, t: Floats) -> Floats:
@@ -171,7 +176,7 @@ class BlendEdges:
         """
         a, b = self.network.charts.exponents_at(corners).T
         jets = edge_jets(self.network.order, a[:, None], x)[2]
-        rays = self.network.charts.at(corners, further)[:, ACROSS] * b[:, None, None]
+        rays = self.network.charts.at(corners, further, ACROSS) * b[:, None, None]
         return _combine(np.moveaxis(rays, -1, 0), jets)
 
     def _nudged(self, half_edges: Ints, sides: Ints, x: Floats) -> Floats:
@@ -199,30 +204,25 @@ def _combine(rays: Floats, jets: Floats) -> Floats:
 
 
 def blend_edges(
-    network: Network, topology: Topology, first: Ints, half_edges: Ints, curves: Floats | None, corner_normals: Floats
+    network: Network,
+    topology: Topology,
+    first: Ints,
+    half_edges: Ints,
+    curves: EndCurves | None,
+    corner_normals: Floats,
 ) -> BlendEdges:
     """Edges of the patches' ``topology``; ``first (E,)`` half-edge of each, ``half_edges (N,)`` of the normal fields.
 
-    ``curves (2Q,3,3)`` replace the coefficients at features, NaN elsewhere, so that all faces there share their bits.
+    ``curves`` replace the coefficients at features, so that all faces there share their bits.
     """
-    quads, charts = network.quads, network.charts
-    base = quads.topology
+    base = network.quads.topology
     starts = start_ends(base)
-    rays = np.empty((2 * len(base.edges), 3, 3))
-    exponents = np.empty(2 * len(base.edges))
     ends = starts ^ 1
+    corners, further = np.empty((2, 2 * len(base.edges)), dtype=np.int32)
     boundary = np.flatnonzero(base.twin < 0)  # where they end no half-edge starts
-    for corners, target, further in ((base.next[boundary], ends[boundary], 1), (np.arange(len(starts)), starts, 0)):
-        for begin in range(0, len(corners), WINDOW):
-            part = slice(begin, begin + WINDOW)
-            rays[target[part]] = charts.at(corners[part], further)[:, ALONG]
-            exponents[target[part]] = charts.exponents_at(corners[part])[:, 0]
-    if curves is not None:
-        known = ~np.isnan(curves[:, 0, 0])
-        rays[known] = curves[known]
-    sides = quads.sides[first]
+    corners[ends[boundary]], further[ends[boundary]] = base.next[boundary], 1
+    corners[starts], further[starts] = np.arange(len(starts)), 0
+    sides = network.quads.sides[first]
     passed = np.stack([starts[sides], ends[sides]], axis=2).reshape(len(first), -1)
-    forward = topology.forward[first][:, None]
-    return BlendEdges(
-        network, topology, rays, exponents, np.where(forward, passed, passed[:, ::-1]), half_edges, corner_normals
-    )
+    passed = np.where(topology.forward[first][:, None], passed, passed[:, ::-1])
+    return BlendEdges(network, topology, corners, further, curves, passed, half_edges, corner_normals)
