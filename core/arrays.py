@@ -67,7 +67,9 @@ def cross(a: Floats, b: Floats, axis: int = -1) -> Floats:
 def unit_rows(vectors: Floats) -> Floats:
     """Vectors ``(3,...)`` along the leading axis scaled to length 1, zero where they have none."""
     length = np.sqrt(np.einsum("c...,c...->...", vectors, vectors))
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+    if not length.all():
+        length = np.where(length == 0, 1.0, length)
+    return vectors / length
 
 
 def by_component(rows: Floats) -> Floats:

@@ -10,14 +10,29 @@ from the lexicographically smallest of its positions, so that the corner listed 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from curvify.arrays import values_of
-from curvify.dissect import Cut, Group, cut_group, edge_keys, is_in
 from curvify.errors import OptionError
 from curvify.mesh import Bools, Floats, Ints
-from curvify.polygons import cross_rows, distinct, dot_rows, judge, lay_flat, link_darts, next_corners
+from curvify.polygons import (
+    cross_rows,
+    distinct,
+    dot_rows,
+    edge_keys,
+    is_in,
+    judge,
+    lay_flat,
+    link_darts,
+    next_corners,
+    surely_convex,
+)
 from curvify.records import record
+
+if TYPE_CHECKING:
+    from curvify.dissect import Cut, Group
 
 RULES = ("best", "closest")
 CONCAVE, KEYHOLE, MANY_SIDED, FOLDING, UNSPLIT, FOLDED, DOUBLED = 1, 2, 4, 8, 16, 32, 64
@@ -30,6 +45,7 @@ REASONS = {
     "doubled": DOUBLED,
 }
 ROUNDS = 4  # how often faces whose diagonals meet are cut anew
+TOGETHER = 30_000  # corners judged at once
 
 
 @record
@@ -109,16 +125,20 @@ def _faces_to_split(positions: Floats, offsets: Ints, vertices: Ints, max_sides:
     groups = []
     for size in values_of(sizes[sizes > 3]):
         of_size = np.flatnonzero(sizes == size)
-        for faces in np.array_split(of_size, -(-len(of_size) * size // 30_000)):
+        for faces in np.array_split(of_size, -(-len(of_size) * size // TOGETHER)):
             corners = offsets[faces] + np.arange(size)[:, None]
             ids = vertices[corners]
-            points = rows[:, ids]
-            acceptable, _, area = judge(points)
+            points = np.take(rows, ids, axis=1)
+            acceptable = surely_convex(points) if size == 4 else np.zeros(len(faces), dtype=bool)
+            unsure = np.flatnonzero(~acceptable)
+            if len(unsure):
+                acceptable[unsure] = judge(points[:, :, unsure]).acceptable
             simple = distinct(ids)
             bad = ~acceptable | ~simple | (size > max_sides)
             if not bad.any():
                 continue
             sides = points - np.roll(points, 1, axis=1)
+            area = cross_rows(points - points[:, :1], np.roll(points, -1, axis=1) - points).sum(axis=1)
             area_size = np.sqrt(dot_rows(area, area))
             bad &= area_size > 1e-10 * dot_rows(sides, sides).sum(axis=0)
             if bad.any():
@@ -127,6 +147,8 @@ def _faces_to_split(positions: Floats, offsets: Ints, vertices: Ints, max_sides:
 
 
 def _gather(faces: Ints, corners: Ints, ids: Ints, rows: Floats, convex: Bools) -> Group:
+    from curvify.dissect import Group  # most meshes have no face to cut
+
     size = len(ids)
     turned = (_first_corners(rows[:, ids]) + np.arange(size)[:, None]) % size
     corners, ids = np.take_along_axis(corners, turned, axis=0), np.take_along_axis(ids, turned, axis=0)
@@ -160,6 +182,8 @@ def _cut_groups(groups: list[Group], edges: Ints, reasons: Ints, rule: str, max_
     Each face is first cut as if it were alone. Where a diagonal meets an edge or another face's diagonal,
     the face (of two, the smaller) is cut again, now avoiding all diagonals that stay.
     """
+    from curvify.dissect import cut_group
+
     done = []
     avoid, known = None, edges
     for attempt in range(ROUNDS):
@@ -308,6 +332,10 @@ def _sines(leave: Floats, back: Floats, normal: Floats) -> Floats:
 def cut_along(offsets: Ints, vertices: Ints, pairs: Ints, reasons: Ints) -> Split:
     """The pieces that the diagonals ``pairs (D,2)``, of source corners, make of the faces; they must not cross."""
     corner_count, sizes = len(vertices), np.diff(offsets)
+    if not len(pairs):
+        none = np.zeros(0, dtype=np.int64)
+        faces, corners = np.arange(len(sizes)), np.arange(corner_count)
+        return Split(offsets, vertices, faces, corners, np.full(corner_count, -1), none, offsets, reasons)
     owner = np.repeat(np.arange(len(sizes)), sizes)
     cut = np.zeros(len(sizes), dtype=bool)
     cut[owner[pairs[:, 0]]] = True

@@ -20,6 +20,8 @@ from curvify.polygons import (
     BACKWARD_COST,
     distinct,
     dot_rows,
+    edge_keys,
+    is_in,
     judge,
     link_darts,
     triangulate,
@@ -59,19 +61,6 @@ class Group(NamedTuple):
             self.convex[which],
             self.simple[which],
         )
-
-
-def edge_keys(a: Ints, b: Ints) -> Ints:
-    """One number for each pair of vertices, whichever comes first."""
-    return np.minimum(a, b) * 2**32 + np.maximum(a, b)
-
-
-def is_in(keys: Ints, sorted_keys: Ints) -> Bools:
-    """Which ``keys``, of any shape, are among the ``sorted_keys (K,)``."""
-    if not len(sorted_keys):
-        return np.zeros(keys.shape, dtype=bool)
-    found = np.minimum(np.searchsorted(sorted_keys, keys), len(sorted_keys) - 1)
-    return np.asarray(sorted_keys[found] == keys)
 
 
 def cut_group(group: Group, avoid: Ints | None, rule: str, max_sides: int) -> Cut:

@@ -59,7 +59,7 @@ def enough_points(fields: Floats, tolerance: float) -> Bools:
 
     The coefficients of an analytic function fall like a geometric series: the last four give its rate, which gives
     the sum of those left out. Enough when that is below ``tolerance`` times the longest of a patch's vectors, or
-    when the last four are rounding noise.
+    when the last four are rounding noise. The vectors at an end, in the middle and near the other end stand for all.
     """
     rows = fields.transpose(3, 0, 2, 1)  # the order in memory
     last = tables.tail_matrix(len(rows)).T @ rows.reshape(len(rows), -1)
@@ -67,7 +67,7 @@ def enough_points(fields: Floats, tolerance: float) -> Bools:
     earlier, later = np.maximum(last[0], last[1]), np.maximum(last[2], last[3])
     rate = np.sqrt(np.divide(later, earlier, out=np.ones_like(later), where=earlier > later))
     left_out = SAFETY * later * rate / np.maximum(1 - rate, 1 / SAFETY)
-    size = np.maximum(rows.max(axis=(0, 1, 2)), -rows.min(axis=(0, 1, 2)))
+    size = np.abs(rows[:: len(rows) // 2]).max(axis=(0, 1, 2))
     noise = np.maximum(earlier, later).max(axis=0) <= NOISE * size
     return noise | (left_out.max(axis=0) <= tolerance * size)
 
@@ -91,31 +91,35 @@ def fill_patches(
     grid, exact = (patch_class.sides, level), patch_class.normals is None
     orders = 3 if exact else 1
     for place, values in _evaluate_surface(patch_class.surface, rows, sampling, level, tolerance, orders):
-        _store(positions, place, values[0])
+        where = as_slice(place[0]), place[1]
+        _store(positions, where, values[0])
         if exact:
-            normal, parallel = _cross_normals(values[1], values[2])
-            _store(normals, place, normal)
+            normal, length, parallel = _cross_products(values[1], values[2])
+            _store(normals, where, normal, length)
             if parallel is not None:
                 face, sample = parallel
                 ids, points = patch_class.patches[rows[place[0][face]]], sampling.points[place[1]][sample]
                 normals[place[0][face], place[1].start + sample] = blended_normals(patches, ids, points)
     if patch_class.normals is not None:
         for place, values in _evaluate_form(patch_class.normals, rows, sampling.points, grid, tolerance, 1):
-            _store(normals, place, unit_rows(values[0]))
+            _store(normals, (as_slice(place[0]), place[1]), unit_rows(values[0]))
         lost = np.nonzero(~normals.any(axis=2))  # where the blend of opposite normals vanishes
         if len(lost[0]):
             normals[lost] = blended_normals(patches, patch_class.patches[rows[lost[0]]], sampling.points[lost[1]])
 
 
-def _store(out: Floats, place: tuple[Ints, slice], values: Floats) -> None:
-    """Write ``values (3,f,S)`` to the patches and samples of ``place`` in ``out (F,S,3)``."""
-    rows, samples = as_slice(place[0]), place[1]
+def _store(
+    out: Floats, place: tuple[Ints | slice, slice], values: Floats, divisor: Floats | None = None
+) -> None:
+    """Write ``values (3,f,S)``, over ``divisor (f,S)``, to the patches and samples of ``place`` in ``out (F,S,3)``."""
     for i in range(3):
-        out[rows, samples, i] = values[i]
+        out[(*place, i)] = values[i] if divisor is None else np.divide(values[i], divisor, out=values[i])
 
 
-def _cross_normals(a: Floats, b: Floats) -> tuple[Floats, tuple[Ints, Ints] | None]:
-    """Unit cross products ``(3,f,S)`` of vectors ``(3,f,S)``, and where they are parallel, if anywhere."""
+def _cross_products(a: Floats, b: Floats) -> tuple[Floats, Floats, tuple[Ints, Ints] | None]:
+    """Cross products ``(3,f,S)`` of vectors ``(3,f,S)``, their lengths ``(f,S)``, and where they are parallel, if
+    anywhere: the length there is 1.
+    """
     normal, work = _work("normal", a.shape), _work("product of two", a.shape[1:])
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -132,9 +136,7 @@ def _cross_normals(a: Floats, b: Floats) -> tuple[Floats, tuple[Ints, Ints] | No
             face, sample = np.nonzero(found)
             parallel = face, sample
         square[found] = 1.0
-    np.sqrt(square, out=square)
-    normal /= square
-    return normal, parallel
+    return normal, np.sqrt(square, out=square), parallel
 
 
 def _evaluate_surface(
@@ -220,13 +222,13 @@ def _chunk(linear: Floats, nodes: Floats, part: Ints, size: int, block: Tables, 
     columns, (sides, points) = linear.shape[2], nodes.shape[2:]
     assert block.matrix is not None
     samples = block.last - block.first
-    vectors = _work("vectors", (3, size, len(block.matrix)))
+    vectors = _work("vectors", (len(block.matrix), 3, size))  # patches last, as controls come and products like it
     chosen = as_slice(part)
-    vectors[:, :count, :columns] = linear[:, chosen]
-    vectors[..., columns:].reshape(3, size, sides, points)[:, :count] = nodes[:, chosen]
-    vectors[:, count:] = vectors[:, count - 1 : count]
+    vectors[:columns, :, :count] = linear[:, chosen].transpose(2, 0, 1)
+    vectors[columns:].reshape(sides, points, 3, size)[..., :count] = nodes[:, chosen].transpose(2, 3, 0, 1)
+    vectors[..., count:] = vectors[..., count - 1 : count]
     product = _work("product", (3 * size, orders * samples))
-    np.matmul(vectors.reshape(3 * size, -1), block.matrix, out=product)
+    np.matmul(vectors.reshape(len(vectors), -1).T, block.matrix, out=product)
     return product.reshape(3, size, orders, samples)[:, :count].transpose(2, 0, 1, 3)
 
 

@@ -138,6 +138,20 @@ def judge(points: Floats, counts: Ints | None = None, up: bool = False) -> Verdi
     return Verdict(acceptable, (-cosines / lengths).max(axis=0), area)
 
 
+def surely_convex(points: Floats) -> Bools:
+    """Which quads ``(3,4,B)`` are convex beyond doubt: no two corners turn about axes more than a right angle apart.
+
+    Their area vector and their normal of equation (12) are sums of these axes, so that `judge` accepts them.
+    """
+    leave = np.concatenate([points[:, 1:], points[:, :1]], axis=1) - points
+    turn = cross_rows(leave, np.concatenate([leave[:, 1:], leave[:, :1]], axis=1))
+    result = np.ones(points.shape[2], dtype=bool)
+    for i in range(4):
+        for j in range(i):
+            result &= dot_rows(turn[:, i], turn[:, j]) >= 0
+    return result
+
+
 def cross_rows(a: Floats, b: Floats) -> Floats:
     """Cross product of vectors whose coordinates come first, ``(3,...)``."""
     result = np.empty(np.broadcast_shapes(a.shape, b.shape))
@@ -154,6 +168,19 @@ def dot_rows(a: Floats, b: Floats) -> Floats:
     total += a[1] * b[1]
     total += a[2] * b[2]
     return total
+
+
+def edge_keys(a: Ints, b: Ints) -> Ints:
+    """One number for each pair of vertices, whichever comes first."""
+    return np.minimum(a, b) * 2**32 + np.maximum(a, b)
+
+
+def is_in(keys: Ints, sorted_keys: Ints) -> Bools:
+    """Which ``keys``, of any shape, are among the ``sorted_keys (K,)``."""
+    if not len(sorted_keys):
+        return np.zeros(keys.shape, dtype=bool)
+    found = np.minimum(np.searchsorted(sorted_keys, keys), len(sorted_keys) - 1)
+    return np.asarray(sorted_keys[found] == keys)
 
 
 def lay_flat(points: Floats) -> Floats:

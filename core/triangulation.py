@@ -12,9 +12,8 @@ import numpy as np
 
 from curvify.arrays import values_of
 from curvify.convex import Split, cut_along
-from curvify.dissect import edge_keys, is_in
 from curvify.mesh import Bools, Floats, Ints
-from curvify.polygons import cross_rows, dot_rows, judge, lay_flat, next_corners
+from curvify.polygons import cross_rows, dot_rows, edge_keys, is_in, judge, lay_flat, next_corners
 
 #: Diagonals whose squared lengths agree to this share are equally long.
 EQUAL = 1e-9

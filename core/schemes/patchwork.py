@@ -79,12 +79,9 @@ class Patchwork:
         In memory the faces come last.
         """
         size = points.shape[2]
-        stored = points.transpose(1, 2, 0).reshape(-1, 3)
-        turned = ~self.topology.forward[corners].T
-        first, step = size * rows.T + (size - 1) * turned, 1 - 2 * turned
-        found = take_rows(stored, first + step * np.arange(size)[:, None, None]).reshape(size, -1, 3)
-        planes = np.ascontiguousarray(found.transpose(0, 2, 1))
-        return planes.reshape(size, 3, *first.shape).transpose(1, 3, 2, 0)
+        stored = points.transpose(1, 2, 0).reshape(-1, 3 * size)
+        found = by_component(take_rows(stored, rows.T.reshape(-1))).T.reshape(size, 3, *rows.T.shape)
+        return np.where(self.topology.forward[corners].T, found, found[::-1]).transpose(1, 3, 2, 0)
 
     def size_classes(self) -> Iterator[tuple[int, Ints]]:
         """Polygon sizes and the pieces ``(f,)`` of each."""
