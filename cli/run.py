@@ -16,7 +16,6 @@ from curvify.backends import Backend
 from curvify.cli import files
 from curvify.cli.console import Console, size
 from curvify.cli.predict import predicted_bytes, predicted_faces
-from curvify.cli.report import Recorder, refine_report, write_report
 from curvify.cli.trimming import check_trim, load_mask, trimmed_output
 from curvify.errors import FormatError, LimitError, MeshError, OptionError
 from curvify.formats.dense import dense_output
@@ -29,6 +28,7 @@ from curvify.threads import processors
 from curvify.words import count_of, listed
 
 if TYPE_CHECKING:
+    from curvify.cli.report import Recorder
     from curvify.mask import Mask
 
 #: Options that a scheme may have, one or several.
@@ -334,7 +334,7 @@ def _refine(run: Run, console: Console) -> None:
     console.explain(f"scheme {request.scheme}, {run.surface.amount(request.level)}, {options}, {run.dtype.name}")
     for source, counts in run.surface.marks.items():
         console.explain(f"{source}: {', '.join(count_of(number, kind) for kind, number in counts.items())}")
-    recorder = Recorder(run.surface) if request.report is not None else None
+    recorder = _recorder(run)
     with ExitStack() as stack:
         with timed(run.seconds, "open_backend"):
             samples = run.surface.face_count(request.level)
@@ -347,7 +347,18 @@ def _refine(run: Run, console: Console) -> None:
     console.explain(f"{request.target}: {_dense_sizes(run, layout)}" + (f", {size(run.bytes)}" if run.bytes else ""))
     console.explain(", ".join(f"{stage.replace('_', ' ')} {took:.3f} s" for stage, took in run.seconds.items()))
     if request.report is not None and recorder is not None:
+        from curvify.cli.report import refine_report, write_report
+
         write_report(request.report, refine_report(run, layout, recorder))
+
+
+def _recorder(run: Run) -> Recorder | None:
+    """What notes the vertices for the report, where one is asked for."""
+    if run.request.report is None:
+        return None
+    from curvify.cli.report import Recorder
+
+    return Recorder(run.surface)
 
 
 def _backend_name(backend: dict[str, Any]) -> str:

@@ -46,6 +46,19 @@ def ranking(keys: Ints) -> Ints:
     return packed
 
 
+def offsets_of(sizes: Ints) -> Ints:
+    """Where each of some runs with ``sizes (n,)`` begins, and where the last one ends: ``(n+1,)``."""
+    result = np.zeros(len(sizes) + 1, dtype=np.int64)
+    np.cumsum(sizes, out=result[1:])
+    return result
+
+
+def all_finite(values: Floats) -> bool:
+    """Whether all values are finite numbers: their sum is, unless it overflows."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.isfinite(values.sum()) or np.isfinite(values).all())
+
+
 def values_of(small: Ints) -> list[int]:
     """Distinct values of small non-negative integers, ascending."""
     return [int(value) for value in np.flatnonzero(np.bincount(small))]

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from curvify.arrays import take_rows
+from curvify.arrays import all_finite, offsets_of, take_rows
 from curvify.errors import FormatError
 from curvify.formats.ply_header import Header, read_header
 from curvify.formats.ply_tables import Table, read_tables
@@ -52,7 +52,7 @@ def read_ply(data: bytes, name: str) -> PolygonMesh:
     smoothing = faces.values("smoothing_group")
     return PolygonMesh(
         positions,
-        np.concatenate([[0], np.cumsum(faces.sizes)]).astype(np.int64),
+        offsets_of(faces.sizes),
         faces.vertices,
         corner_normals=_normals(vertex, faces),
         corner_uvs=_uvs(vertex, faces, warnings),
@@ -123,7 +123,7 @@ def _positions(vertex: Table) -> tuple[Floats, np.dtype[np.floating]]:
             f"{vertex.body.name}:{vertex.element.line}: element 'vertex' has no properties x, y and z"
         )
     positions = _floats(vertex, "x", "y", "z")
-    if not np.isfinite(positions).all():
+    if not all_finite(positions):
         wild = np.flatnonzero(~np.isfinite(positions).all(axis=1))
         raise vertex.error(
             wild[0], f"vertex {wild[0]} has a coordinate that is not a finite number; remove or mend it"
@@ -167,8 +167,8 @@ def _faces(tables: dict[str, Table], vertices: int, warnings: list[str]) -> _Fac
         kept = counts >= 3
         if not kept.all():
             warnings.append(_skipped(int((~kept).sum()), int(np.argmin(kept))))
-            indices = indices[np.repeat(kept, counts)]
-        faces = _Faces(counts[kept], indices, table, kept)
+            counts, indices = counts[kept], indices[np.repeat(kept, counts)]
+        faces = _Faces(counts, indices, table, kept)
     if "tristrips" in tables:
         triangles = _strip_triangles(tables["tristrips"], vertices)
         if faces.sizes.size and len(triangles):
@@ -213,7 +213,8 @@ def _normals(vertex: Table, faces: _Faces) -> Floats | None:
     if not _has(vertex, "nx", "ny", "nz"):
         return None
     normals = _floats(vertex, "nx", "ny", "nz")
-    if not (np.isfinite(normals).all() and np.einsum("vi,vi->v", normals, normals).all()):
+    squares = np.einsum("vi,vi->v", normals, normals)
+    if not (all_finite(squares) and squares.all()):
         normals[~(np.isfinite(normals).all(axis=1) & normals.any(axis=1))] = np.nan
     return _or_none(take_rows(normals, faces.vertices))
 

@@ -172,7 +172,7 @@ def test_keyholes_become_pieces_with_distinct_vertices(shape: Keyhole, rule: str
 
 
 def test_faces_fit_for_patches_stay_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("curvify.convex.cut_group", None)
+    monkeypatch.setattr("curvify.dissect.cut_group", None)
     angles = np.arange(7) * 2 * np.pi / 7
     points = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
     points = np.concatenate([points, [[3, 0, 1], [2, -3, 0.5]]])
