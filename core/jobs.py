@@ -20,8 +20,9 @@ from curvify.sinks import DenseLayout, Sink
 from curvify.threads import Job
 from curvify.weld import Numbering, cells_of, corner_colors, repeat_vertices
 
-#: Samples in one job.
-WINDOW = 1 << 17
+#: Samples in one job: control vectors are made for all of its patches at once, and cost as much to begin as for 500 of
+#: them.
+WINDOW = 1 << 18
 #: Points of edges in one job: few, so that their work arrays stay in cache.
 EDGE_WINDOW = 1 << 14
 #: Samples that a patch counts for at least.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, BinaryIO
@@ -35,6 +36,7 @@ class PlySink:
     def __init__(self, out: BinaryIO, triangulate: bool = False) -> None:
         self.out, self.triangulate = out, triangulate
         self.anywhere = out.seekable() and hasattr(os, "pwrite")
+        self._own = threading.local()
 
     def begin(self, layout: DenseLayout) -> None:
         """Write the header."""
@@ -74,12 +76,19 @@ class PlySink:
         if self.triangulate:
             wedges, source_faces = triangles(wedges, source_faces)
             start *= self.per_cell
-        records = np.empty(len(wedges), dtype=self.face_type)
-        records["count"] = self.sides
+        records = self._face_records(len(wedges))
         self._set_corners(records, wedges)
         for name, values in zip(self.face_type.names[2:], self.columns, strict=True):  # type: ignore[index]
             records[name] = values[source_faces]
         self._put(records, self.face_origin + start * self.face_type.itemsize if self.anywhere else 0)
+
+    def _face_records(self, count: int) -> np.ndarray[Any, Any]:
+        """Records of this thread's own, kept from block to block, in which the counts stand already."""
+        found: np.ndarray[Any, Any] | None = getattr(self._own, "records", None)
+        if found is None or len(found) < count:
+            found = self._own.records = np.empty(count, dtype=self.face_type)
+            found["count"] = self.sides
+        return found[:count]
 
     def _set_corners(self, records: np.ndarray[Any, Any], wedges: Ints) -> None:
         """Copy all corners of a face as one element: several times faster than a field of numbers."""
