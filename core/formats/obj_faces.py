@@ -11,7 +11,7 @@ import re
 import numpy as np
 
 from curvify.errors import FormatError
-from curvify.formats.scan import BLANK, Bytes, Lines, parse_all, quote
+from curvify.formats.scan import Bytes, Lines, blanks, parse_all, quote
 from curvify.mesh import Bools, Ints
 from curvify.records import record
 
@@ -20,9 +20,6 @@ _KINDS = ("vertex", "texture coordinate", "normal")
 _PLURALS = ("vertices", "texture coordinates", "normals")
 _CORNER = rb"[+-]?\d+(/([+-]?\d+)?){0,2}\Z"
 _SLASH = 47
-
-_FACE_BYTES: Bools = BLANK.copy()
-_FACE_BYTES[list(b"0123456789+-/")] = True
 
 
 @record
@@ -52,9 +49,9 @@ def read_faces(lines: Lines, chosen: Ints, element_lines: tuple[Ints, Ints, Ints
 
 def _parse_corners(text: Bytes) -> tuple[Ints, Ints] | None:
     """Where each corner starts and its numbers as written ``(3,C)``; None if any corner is malformed."""
-    if not _FACE_BYTES[text].all():
+    blank = blanks(text)
+    if not (blank | _in_numbers(text)).all():
         return None
-    blank = BLANK[text]
     slash = text == _SLASH
     corner_first = ~blank
     corner_first[1:] &= blank[:-1]
@@ -74,6 +71,11 @@ def _parse_corners(text: Bytes) -> tuple[Ints, Ints] | None:
     if values is None:
         return None
     return _place_numbers(corners, numbers, values.astype(np.int64), slash)
+
+
+def _in_numbers(text: Bytes) -> Bools:
+    """Which bytes are digits, signs or slashes: what lies from + to 9, but for the comma and the point."""
+    return (text - np.uint8(43) < 15) & (text != 44) & (text != 46)
 
 
 def _place_numbers(corners: Ints, numbers: Ints, values: Ints, slash: Bools) -> tuple[Ints, Ints] | None:

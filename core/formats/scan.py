@@ -43,9 +43,14 @@ def unify_newlines(data: bytes) -> bytes:
     return data
 
 
+def blanks(text: Bytes) -> Bools:
+    """Which bytes of a text are blank, by arithmetic: looking each up in ``BLANK`` takes ten times as long."""
+    return (text == 32) | (text - np.uint8(9) < 5)  # tab to carriage return; smaller ones wrap around
+
+
 def token_starts(text: Bytes) -> Ints:
     """Offsets in ``text`` at which a run of non-blank bytes begins."""
-    blank = BLANK[text]
+    blank = blanks(text)
     first = ~blank
     first[1:] &= blank[:-1]
     return np.flatnonzero(first)
@@ -117,7 +122,7 @@ def split_lines(data: bytes, name: str, continued: bool = False) -> Lines:
     """Cut a text file into lines; ``continued`` joins a line that ends in a backslash to the next."""
     raw = unify_newlines(data)
     text = np.frombuffer(raw + b"\n\n\n\n", dtype=np.uint8).copy()
-    if continued and b"\\\n" in raw:
+    if continued and b"\\" in raw and b"\\\n" in raw:  # one byte is found several times faster
         _join_continued(raw, text)
     newlines = np.flatnonzero(text[: len(raw) + 1] == 10)
     starts = np.concatenate([[0], newlines[:-1] + 1])
