@@ -81,7 +81,7 @@ def corner_normals(
 
 def sum_by(labels: Ints, values: Floats, count: int) -> Floats:
     """Sum of the rows of ``values (n,3)`` that carry each label ``(count,3)``."""
-    return np.stack([np.bincount(labels, values[:, i], count) for i in range(3)]).T
+    return np.array([np.bincount(labels, values[:, i], count) for i in range(3)], dtype=np.float64).T
 
 
 def sector_normals(

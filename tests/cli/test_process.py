@@ -64,6 +64,9 @@ def test_refine_imports_what_it_needs(folder):
         assert "numpy" in found
         heavy = {"trimesh", "scipy", "numba", "moderngl", "pymeshlab", "tqdm", "networkx", "curvify.gpu"}
         assert not found & heavy
+        spare = {"numpy.ma", "numpy.random", "numpy.fft", "numpy.polynomial", "logging", "concurrent.futures"}
+        ours = {"dissect", "subdivision", "shading", "quality", "trim", "simplify", "cli.report", "formats.ply_read"}
+        assert not found & (spare | {f"curvify.{name}" for name in ours})
 
 
 def test_linear_algebra_runs_on_one_thread():

@@ -14,7 +14,7 @@ from curvify import dissect
 from curvify.convex import Split, split_at_corners, split_polygons, whole_faces
 from curvify.errors import OptionError
 from curvify.mesh import Bools, Floats, Ints
-from curvify.polygons import judge, newell_normals, next_corners, previous_corners
+from curvify.polygons import judge, newell_normals, next_corners, previous_corners, surely_convex
 
 Faces = list[list[int]]
 Points = list[tuple[float, float]]
@@ -373,6 +373,15 @@ def test_scale_and_motion_do_not_matter() -> None:
     axes *= np.sign(np.linalg.det(axes))
     for moved in (points * 1e-6, points * 1e6, points @ axes.T, points @ axes.T + 100):
         assert diagonal_pairs(split_faces(moved, faces)) == expected
+
+
+def test_quads_that_are_surely_convex_are_acceptable() -> None:
+    points = np.random.default_rng(3).normal(size=(3, 4, 4000)) * [[[1.0]], [[1.0]], [[0.3]]]
+    points += np.array([[1, 0, -1, 0], [0, 1, 0, -1], [0, 0, 0, 0]])[:, :, None]
+    sure = surely_convex(points)
+    assert 0.1 < sure.mean() < 0.9
+    assert judge(points).acceptable[sure].all()
+
 
 
 @pytest.mark.parametrize("sides", [4, 6])
