@@ -59,7 +59,7 @@ def enough_points(fields: Floats, tolerance: float) -> Bools:
 
     The coefficients of an analytic function fall like a geometric series: the last four give its rate, which gives
     the sum of those left out. Enough when that is below ``tolerance`` times the longest of a patch's vectors, or
-    when the last four are rounding noise. The vectors at an end, in the middle and near the other end stand for all.
+    when the last four are rounding noise. The vectors at both ends and in the middle stand for all.
     """
     rows = fields.transpose(3, 0, 2, 1)  # the order in memory
     last = tables.tail_matrix(len(rows)).T @ rows.reshape(len(rows), -1)
@@ -67,7 +67,7 @@ def enough_points(fields: Floats, tolerance: float) -> Bools:
     earlier, later = np.maximum(last[0], last[1]), np.maximum(last[2], last[3])
     rate = np.sqrt(np.divide(later, earlier, out=np.ones_like(later), where=earlier > later))
     left_out = SAFETY * later * rate / np.maximum(1 - rate, 1 / SAFETY)
-    size = np.abs(rows[:: len(rows) // 2]).max(axis=(0, 1, 2))
+    size = np.abs(rows[[0, len(rows) // 2, -1]]).max(axis=(0, 1, 2))
     noise = np.maximum(earlier, later).max(axis=0) <= NOISE * size
     return noise | (left_out.max(axis=0) <= tolerance * size)
 

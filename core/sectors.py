@@ -305,7 +305,7 @@ def _end_tangents(
     bending[bent] = _marked_bending(marks.edge_normals[bent], bending[bent], chord[bent])
     pointed, weight = _points(topology, sharp, marks.corner)
     tangents = np.empty((3, 2, len(chord))).transpose(2, 1, 0)
-    lined: Bools = lines.any(axis=1)
+    lined: Bools = np.asarray(lines.any(axis=1))
     for end in (0, 1):
         at = topology.edges[:, end]
         tangents[:, end] = directions(chord, mean[:, end], bending)

@@ -187,18 +187,19 @@ class GregoryControls:
     ) -> GregoryControls:
         """Controls of the patches with the given corners ``(f,n)``, ``bulge`` and ``alpha (f,)``."""
         n = corners.shape[1]
-        points, sides = patch_sides(work, corners)
-        target = center_point(points, work.corner_normals(corners), bulge) if kind == "precise" else None
-        tangent = cross_tangent(work, corners, points, sides, kind, target, bulge, alpha)
-        ends = np.array([0.0, 1.0])
-        value, slope = tangent.field_derivatives(ends)
-        if target is not None:
-            slope += value * side_speed(n, ends)[1]  # T' = s F' + s' F, and s = 1 at the ends
-        blocks = [points, *side_legs(sides.curves), slope[..., 0], slope[..., 1]]
-        if target is not None:
-            middle = tangent.fields(np.array([0.5]))[..., 0]
-            blocks += [middle] if n != 4 else []
-        rows = np.zeros((n * len(blocks) + (target is not None), 3, len(corners)))
+        points, tangent, target = cross_tangents(work, corners, kind, bulge, alpha)
+        t = np.array([0.0, 1.0])
+        value, slope = tangent.field_derivatives(t)
+        middle = tangent.fields(np.array([0.5]))[..., 0]
+        curves = tangent.sides.curves
+        corrected = target is not None
+        if corrected:
+            slope = slope + value * side_speed(n, t)[1]  # T' = s F' + s' F, and s = 1 at the ends
+        legs = curves[..., 1] - points, curves[..., 2] - np.roll(points, -1, axis=2)
+        blocks = [points, *legs, slope[..., 0], slope[..., 1]]
+        if corrected and n != 4:
+            blocks.append(middle)
+        rows = np.zeros((n * len(blocks) + corrected, 3, len(corners)))
         for i, block in enumerate(blocks):
             rows[n * i : n * (i + 1)] = block.transpose(2, 0, 1)
         if target is not None:
@@ -209,22 +210,17 @@ class GregoryControls:
         return cls(rows.transpose(1, 2, 0), tangent)
 
 
-def cross_tangent(
-    work: Patchwork,
-    corners: Ints,
-    points: Floats,
-    sides: Sides,
-    kind: str,
-    target: Floats | None,
-    bulge: Floats,
-    alpha: Floats,
-) -> CrossTangent:
-    """Cross tangents of patches with ``points (3,f,n)`` and ``sides``; ``target`` is the center of ``precise``."""
+def cross_tangents(
+    work: Patchwork, corners: Ints, kind: str, bulge: Floats, alpha: Floats
+) -> tuple[Floats, CrossTangent, Floats | None]:
+    """Corner points ``(3,f,n)``, cross tangents and, for ``precise``, the center point ``(3,f)`` of patches."""
+    points, sides = patch_sides(work, corners)
     if kind == "smooth":
-        return smooth_tangent(sides, bulge)
-    if target is not None:
-        return precise_tangent(sides, target)
-    return paper_tangent(sides, points, side_normals(work, corners), kind, alpha)
+        return points, smooth_tangent(sides, bulge), None
+    if kind == "precise":
+        target = center_point(points, work.corner_normals(corners), bulge)
+        return points, precise_tangent(sides, target), target
+    return points, paper_tangent(sides, points, side_normals(work, corners), kind, alpha), None
 
 
 def side_normals(work: Patchwork, corners: Ints) -> Floats:
@@ -244,13 +240,9 @@ def patch_sides(work: Patchwork, corners: Ints) -> tuple[Floats, Sides]:
     """Corner points ``(3,f,n)`` and side data of patches."""
     points = work.corner_points(corners)
     curves, fields = work.side_curves(corners), work.side_fields(corners)
-    first, last = side_legs(curves)
-    return points, Sides(curves, fields, 3 * behind(last), 3 * ahead(first))
-
-
-def side_legs(curves: Floats) -> tuple[Floats, Floats]:
-    """Steps ``(3,f,n)`` of the curves ``(3,f,n,4)`` from their two ends."""
-    return curves[..., 1] - curves[..., 0], curves[..., 2] - curves[..., 3]
+    start = 3 * (behind(curves[..., 2]) - points)
+    end = 3 * ahead(curves[..., 1] - points)
+    return points, Sides(curves, fields, start, end)
 
 
 def precise_tangent(sides: Sides, target: Floats) -> ProjectedBlend:
