@@ -132,11 +132,26 @@ def blocks(form: Form, points: Floats, grid: tuple[int, int], count: int, orders
     for first in range(0, len(points), SAMPLES):
         last = min(first + SAMPLES, len(points))
         key = (form.key, grid, count, orders, first)
-        yield _CACHE.get(key, partial(_make_tables, form, points, first, last, count, orders))
+        basis = partial(_recent_basis, form, points, grid, first, last)
+        yield _CACHE.get(key, partial(_make_tables, basis, first, last, count, orders))
 
 
-def _make_tables(form: Form, points: Floats, first: int, last: int, count: int, orders: int) -> Tables:
+#: The basis that was made last, with its key: tables for more Chebyshev points are made from it next.
+_RECENT: list[tuple[object, Basis]] = []
+
+
+def _recent_basis(form: Form, points: Floats, grid: tuple[int, int], first: int, last: int) -> Basis:
+    key = (form.key, grid, first)
+    for known, basis in list(_RECENT):
+        if known == key:
+            return basis
     basis = form.basis(points[first:last])
+    _RECENT[:] = [(key, basis)]
+    return basis
+
+
+def _make_tables(basis_of: Callable[[], Basis], first: int, last: int, count: int, orders: int) -> Tables:
+    basis = basis_of()
     if not count:
         return Tables(first, last, None, basis)
     samples, sides = basis.weights.shape[1:]
