@@ -216,9 +216,9 @@ def _by_tables(
 
 
 def _chunk(linear: Floats, nodes: Floats, part: Ints, size: int, block: Tables, orders: int) -> Floats:
-    """One matrix product for a chunk, padded by its last patch to a multiple of 16 patches."""
+    """One matrix product for a chunk, padded by its last patch to a multiple of 4 patches."""
     count = len(part)
-    size = min(size, -(-count // 16) * 16)
+    size = min(size, -(-count // 4) * 4)
     columns, (sides, points) = linear.shape[2], nodes.shape[2:]
     assert block.matrix is not None
     samples = block.last - block.first

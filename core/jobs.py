@@ -23,6 +23,9 @@ from curvify.weld import Numbering, cells_of, corner_colors, repeat_vertices
 #: Samples in one job: control vectors are made for all of its patches at once, and cost as much to begin as for 500 of
 #: them.
 WINDOW = 1 << 18
+#: Patches that a job has at least at high levels, as long as these are not more samples than LARGEST: tables too large
+#: to keep are made for each job.
+TOGETHER, LARGEST = 16, 1 << 20
 #: Points of edges in one job: few, so that their work arrays stay in cache.
 EDGE_WINDOW = 1 << 14
 #: Samples that a patch counts for at least.
@@ -107,7 +110,8 @@ class _Evaluation:
         fresh = np.concatenate([[True], faces[1:] != faces[:-1]])
         sizes = np.diff(starts, append=self.numbering.vertex_count)
         counted = np.maximum(sizes, PATCH)
-        group = (np.cumsum(counted) - counted) // WINDOW
+        window = max(WINDOW, min(TOGETHER * int(counted.max()), LARGEST))
+        group = (np.cumsum(counted) - counted) // window
         heads = np.flatnonzero(fresh)
         bounds = heads[np.concatenate([[True], group[heads][1:] != group[heads][:-1]])]
         yield from itertools.pairwise([*bounds.tolist(), len(starts)])
