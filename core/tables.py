@@ -141,7 +141,7 @@ _RECENT: list[tuple[object, Basis]] = []
 
 
 def _recent_basis(form: Form, points: Floats, grid: tuple[int, int], first: int, last: int) -> Basis:
-    key = (form.key, grid, first)
+    key = (form.key, grid, first, last)
     for known, basis in list(_RECENT):
         if known == key:
             return basis
