@@ -19,11 +19,11 @@ import numpy as np
 
 from curvify.arrays import cross, distinct
 from curvify.convex import split_at_corners, whole_faces
-from curvify.dissect import edge_keys, is_in
 from curvify.mesh import Bools, Floats, Ints, Marks, PolygonMesh
 from curvify.normals import degrees_between, dot, unit
 from curvify.options import MeshOptions
 from curvify.pieces import pieces_of
+from curvify.polygons import edge_keys, is_in
 from curvify.prepare import prepare_mesh
 from curvify.records import record, replaced
 from curvify.simplify.moves import apart, corners_at, keeps_shapes
