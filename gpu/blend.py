@@ -18,7 +18,8 @@ import numpy.typing as npt
 
 from curvify.arrays import values_of
 from curvify.gpu.device import Device
-from curvify.gpu.products import Products, Singles, power_of_two, restored
+from curvify.gpu.memory import Singles
+from curvify.gpu.products import Products, power_of_two, restored
 from curvify.gpu.programs import read_shaders
 from curvify.mesh import Floats, Ints
 from curvify.sampling import Sampling
@@ -199,10 +200,15 @@ class BlendDevice:
 
     def _run(self, order: int, starts: Ints, uv: Floats) -> Singles:
         results = np.empty((len(starts), len(uv), LENGTH), dtype=np.float32)
-        textures = [self._texture(starts.astype(np.int32)[:, None]), self._texture(uv.astype(np.float32))]
-        buffer = self.products.buffer(results.nbytes)
+        memory = self.products.memory
+        textures = [
+            self._texture("indices", starts.astype(np.int32)[:, None]),
+            self._texture("tables", uv.astype(np.float32)),
+        ]
+        buffer = memory.buffer(results.nbytes)
         self._programs[order].run([*self._charts, *textures], buffer, len(starts), len(uv))
-        buffer.read_into(results, results.nbytes)
+        memory.read_into(buffer, results)
+        memory.give_back(buffer)
         for texture in textures:
             texture.release()
         return results
@@ -213,11 +219,12 @@ class BlendDevice:
             texture.release()
         self._texels, self._network = ChartTexels.pack(network), network
         rows = self._texels.coefficients.reshape(-1, 36)
-        self._charts = [self._texture(rows, 9), self._texture(self._texels.corners)]
+        self._charts = [self._texture("controls", rows, 9), self._texture("indices", self._texels.corners)]
 
-    def _texture(self, rows: npt.NDArray[Any], texels: int = 1) -> moderngl.Texture:
+    def _texture(self, kind: str, rows: npt.NDArray[Any], texels: int = 1) -> moderngl.Texture:
         """A texture of rows of ``texels`` texels each."""
-        return self.products.texture(fold(rows, self.products.widest, texels))
+        memory = self.products.memory
+        return memory.send_image(kind, fold(rows, memory.widest, texels))
 
 
 def quad_parameters(sampling: Sampling) -> Floats:

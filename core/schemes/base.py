@@ -20,6 +20,7 @@ from curvify.arrays import as_slice
 from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.records import field, record
 from curvify.sampling import Sampling
+from curvify.schemes.construction import Construction, DeviceForm
 from curvify.topology import Topology
 
 if TYPE_CHECKING:
@@ -91,13 +92,14 @@ class Form:
     ``key`` identifies the basis (for caches); ``basis(points (S,2))`` gives its tables;
     ``controls(rows)`` the control data of some of the class's faces. The first ``points`` control vectors are points,
     whose weights sum to 1, the others differences of points: a backend of low precision then moves them to an origin
-    near each face. With none, positions are evaluated where they are.
+    near each face. With none, positions are evaluated where they are. ``device`` says how a device makes them itself.
     """
 
     key: Hashable
     basis: Callable[[Floats], Basis]
     controls: Callable[[Ints], Controls]
     points: int = 0
+    device: DeviceForm | None = None
 
 
 @record
@@ -146,11 +148,12 @@ class Edges(Protocol):
 @record
 class BezierEdges:
     """Cubics and polynomial normals: ``curves (3,E,d+1)`` Bezier points of the edges, ``fields (3,N,q+1)`` of the edge
-    normals, which are not of unit length.
+    normals, which are not of unit length. ``construction``: how a device makes them itself.
     """
 
     curves: Floats
     fields: Floats
+    construction: Construction | None = None
 
     def points(self, edges: Ints, t: Floats) -> Floats:
         """Points ``(3,e,m)``."""

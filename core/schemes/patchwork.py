@@ -14,6 +14,7 @@ from curvify.prepare import Coarse
 from curvify.records import field, record
 from curvify.sampling import Sampling
 from curvify.schemes.base import BezierEdges, Edges, PatchClass, Patches
+from curvify.schemes.construction import Construction
 from curvify.schemes.frames import Frame
 from curvify.sectors import Features
 from curvify.topology import Topology
@@ -25,7 +26,7 @@ class Patchwork:
 
     ``topology`` of the pieces; ``split`` where they come from, in terms of the cleaned loops; per edge
     ``curves (3,E,d+1)``; ``fields (3,N,q+1)`` edge normals and ``side_field (C,)`` the one of each half-edge; ``normals
-    (C,3)`` of the corners. In memory the points of an edge lie together.
+    (C,3)`` of the corners; ``construction``: how a device builds them. In memory the points of an edge lie together.
     """
 
     coarse: Coarse
@@ -38,6 +39,7 @@ class Patchwork:
     normals: Floats
     warnings: list[str] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
+    construction: Construction | None = None
 
     @classmethod
     def on(
@@ -91,7 +93,7 @@ class Patchwork:
 
     def patches(self, classes: list[PatchClass], sampling: Callable[[int, int], Sampling]) -> Patches:
         """Everything a backend and the numbering need."""
-        edges = BezierEdges(self.curves, self.fields)
+        edges = BezierEdges(self.curves, self.fields, self.construction)
         patches = assemble_patches(
             self.coarse, self.split, self.topology, edges, self.side_field, self.normals, sampling
         )

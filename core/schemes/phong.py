@@ -7,6 +7,7 @@ the three tangent planes of the corners, and the mean of the projections taken w
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.options import MeshOptions
 from curvify.prepare import Coarse, prepare_mesh
 from curvify.schemes.base import Patches
+from curvify.schemes.construction import Construction, DeviceForm
 from curvify.schemes.frames import Frame
 from curvify.schemes.triangles import (
     all_corners,
@@ -22,6 +24,7 @@ from curvify.schemes.triangles import (
     projected_legs,
     quadratic_columns,
     quadratic_fields,
+    quadratic_inputs,
     triangle_patches,
     triangle_pieces,
 )
@@ -55,13 +58,20 @@ def prepare(mesh: PolygonMesh | Coarse, options: Options | None = None) -> Patch
     fields = quadratic_fields(frame.pairs, frame.pairs.mean(axis=1), pieces.sides_facing)
     work = pieces.with_curves(quadratic_curves(frame, options.alpha), fields)
     work.warnings += pieces.coarse.unused_marks((), name)
+    work.construction = Construction(
+        name,
+        partial(quadratic_inputs, work, frame.tangents),
+        {"CURVE_POINTS": 3, "FIELD_POINTS": 3, "VECTORS": 3},
+        {"alpha": options.alpha},
+    )
     corners = all_corners(work)
+    device = DeviceForm(work.construction, corners[:, 0], "column", 6)
 
     def vectors(rows: Ints) -> Floats:
         own = corners[rows]
         return np.concatenate([work.corner_points(own), work.side_curves(own)[..., 1]], axis=2)
 
-    surface = block_form("phong", quadratic_columns, vectors, 6)
+    surface = block_form(name, quadratic_columns, vectors, 6, device)
     return triangle_patches(work, surface)
 
 

@@ -7,6 +7,7 @@ is not: only the normals hide the kinks.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from curvify.normals import dot, unit
 from curvify.options import MeshOptions
 from curvify.prepare import Coarse, prepare_mesh
 from curvify.schemes.base import Patches
+from curvify.schemes.construction import Construction, DeviceForm
 from curvify.schemes.domain import jet_product
 from curvify.schemes.frames import Frame
 from curvify.schemes.patchwork import Patchwork
@@ -24,6 +26,7 @@ from curvify.schemes.triangles import (
     jet_power,
     projected_legs,
     quadratic_fields,
+    quadratic_inputs,
     triangle_patches,
     triangle_pieces,
 )
@@ -50,8 +53,12 @@ def prepare(mesh: PolygonMesh | Coarse, options: Options | None = None) -> Patch
     fields = quadratic_fields(frame.pairs, reflected_normals(frame), pieces.sides_facing)
     work = pieces.with_curves(cubic_curves(frame), fields)
     work.warnings += pieces.coarse.unused_marks((), name)
+    work.construction = Construction(
+        name, partial(quadratic_inputs, work, frame.tangents), {"CURVE_POINTS": 4, "FIELD_POINTS": 3, "VECTORS": 3}
+    )
     corners = all_corners(work)
-    surface = block_form("pn", cubic_columns, lambda rows: cubic_controls(work, corners[rows]), 10)
+    device = DeviceForm(work.construction, corners[:, 0], "column", 10)
+    surface = block_form(name, cubic_columns, lambda rows: cubic_controls(work, corners[rows]), 10, device)
     return triangle_patches(work, surface)
 
 

@@ -19,12 +19,16 @@ from curvify.prepare import Coarse
 from curvify.records import record
 from curvify.sampling import domain_corners, triangle_sampling
 from curvify.schemes.base import Basis, Form, LinearControls, PatchClass, Patches, linear_basis
+from curvify.schemes.construction import DeviceForm, Inputs, assemble_inputs, projected_rule, side_frame
 from curvify.schemes.domain import jet_product
 from curvify.schemes.frames import Frame, edge_frame
 from curvify.schemes.patchwork import Patchwork
 from curvify.sectors import Features
 from curvify.triangulation import triangulate_polygons
 from curvify.words import count_of
+
+#: How much closer than opposite normals may come before single precision cannot tell.
+NEARLY = 0.02
 
 
 @record
@@ -92,6 +96,18 @@ def projected_legs(frame: Frame) -> tuple[Floats, Floats]:
     return dot(chord, start) * start, dot(chord, end) * end
 
 
+def quadratic_inputs(work: Patchwork, tangents: Floats) -> Inputs:
+    """What a device builds triangles from whose edges have end ``tangents (E,2,3)`` and quadratic normal fields.
+
+    Where end normals are nearly opposite it is told the field's middle.
+    """
+    frame = side_frame(work)
+    pairs = frame.pairs
+    opposite = dot(pairs[:, 0], pairs[:, 1])[:, 0] < OPPOSITE + NEARLY
+    middle = np.where(opposite, work.fields[..., 1], 0.0)
+    return assemble_inputs(work, frame, tangents, projected_rule, middle.T[:, None])
+
+
 def triangle_patches(work: Patchwork, surface: Form) -> Patches:
     """The patches of a work of triangles whose normals are the fields of its sides, which are quadratic."""
     every = np.arange(len(work.topology.sizes))
@@ -105,7 +121,11 @@ def all_corners(work: Patchwork) -> Ints:
 
 
 def block_form(
-    key: str, columns: Callable[[Floats], Floats], vectors: Callable[[Ints], Floats], points: int = 0
+    key: str,
+    columns: Callable[[Floats], Floats],
+    vectors: Callable[[Ints], Floats],
+    points: int = 0,
+    device: DeviceForm | None = None,
 ) -> Form:
     """A form with the ``columns`` ``(3,L,S)`` of barycentric jets ``(3,3,S)`` and the control ``vectors (3,f,L)``, the
     first ``points`` of which are points.
@@ -114,7 +134,7 @@ def block_form(
     def basis(places: Floats) -> Basis:
         return linear_basis(columns(barycentric(places)))
 
-    return Form((key,), basis, lambda rows: LinearControls(vectors(rows)), points)
+    return Form((key,), basis, lambda rows: LinearControls(vectors(rows)), points, device)
 
 
 def barycentric(points: Floats) -> Floats:
@@ -150,7 +170,9 @@ def quadratic_normals(work: Patchwork, middle: Floats, patches: Ints) -> Form:
         own = corners[rows]
         return np.concatenate([work.corner_normals(own), middle[:, work.side_field[own]]], axis=2)
 
-    return block_form("quadratic normals", quadratic_columns, vectors)
+    construction = work.construction
+    device = None if construction is None else DeviceForm(construction, corners[:, 0], "normal_column", 6)
+    return block_form("quadratic normals", quadratic_columns, vectors, device=device)
 
 
 def quadratic_fields(pairs: Floats, middle: Floats, facing: Floats) -> Floats:

@@ -9,9 +9,9 @@ void main() {
     vec3 values[TILE * ORDERS];
     matrix_product(gl_VertexID / samples, gl_VertexID % samples, values);
 #if defined(UNIT)
-    value = unit_rows(values[0]);
+    value = unit_normal(values[0]);
 #else
-    value = values[0];
+    value = scale * values[0];
 #endif
 #if defined(NORMALS)
     normal = cross_normals(values[1], values[2]);

@@ -1,6 +1,6 @@
 // Entry for devices with compute shaders: one invocation, one tile. LENGTH numbers a sample, samples within patches.
 
-layout(local_size_x = 8) in;
+layout(local_size_x = GROUP) in;
 layout(std430, binding = 0) writeonly buffer Results { float results[]; };
 
 void store(int first, vec3 value) {
@@ -20,12 +20,12 @@ void main() {
                 int from = (p * SAMPLES + s) * ORDERS;
                 int to = ((first_patch + p) * samples + first_sample + s) * LENGTH;
 #if defined(NORMALS)
-                store(to, values[from]);
+                store(to, scale * values[from]);
                 store(to + 3, cross_normals(values[from + 1], values[from + 2]));
 #elif defined(UNIT)
-                store(to, unit_rows(values[from]));
+                store(to, unit_normal(values[from]));
 #else
-                store(to, values[from]);
+                store(to, scale * values[from]);
 #endif
             }
         }
