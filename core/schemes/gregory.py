@@ -23,6 +23,7 @@ from curvify.schemes.base import Basis, Form, PatchClass, Patches, bernstein
 from curvify.schemes.cross_tangents import PaperTangent, ProjectedBlend, Sides, dot, start_share
 from curvify.schemes.folds import blended_inward, build_patchwork, paper_inward
 from curvify.schemes.gregory_basis import center_row, edge_normal_basis, gregory_basis, side_speed
+from curvify.schemes.gregory_device import device_construction, device_form, normal_form
 from curvify.schemes.patchwork import Patchwork
 
 CROSS_TANGENTS = ("precise", "smooth", "linear", "quadratic")
@@ -86,13 +87,13 @@ def prepare(mesh: PolygonMesh | Coarse, options: Options | None = None) -> Patch
         alpha = face_shapes(work, options).alpha[patches]
         return paper_tangent(sides, points, side_normals(work, corners), options.cross_tangent, alpha)
 
-    blended = options.cross_tangent in ("precise", "smooth")
     inward = (
         partial(blended_inward, partial(start_share, options.cross_tangent))
-        if blended
+        if blended(options)
         else partial(paper_inward, tangents_of)
     )
     work = build_patchwork(coarse, options.tangent_lengths, options.split_rule, inward)
+    work.construction = device_construction(work, options.cross_tangent, options.tangent_lengths)
     shape = face_shapes(work, options)
     used = {"precise": ("bulge",), "smooth": ("bulge",), "quadratic": ("alpha",)}.get(options.cross_tangent, ())
     work.warnings += coarse.unused_marks(used, f"gregory with {options.cross_tangent} cross tangents")
@@ -105,6 +106,11 @@ def prepare(mesh: PolygonMesh | Coarse, options: Options | None = None) -> Patch
             if len(rows):
                 classes.append(_patch_class(work, shape, patches[rows], corners[rows], group, options))
     return work.patches(classes, kite_sampling)
+
+
+def blended(options: Options) -> bool:
+    """Whether cross tangents are blends of those at the ends."""
+    return options.cross_tangent in ("precise", "smooth")
 
 
 def is_uneven(points: Floats) -> Bools:
@@ -139,20 +145,26 @@ def _patch_class(
 ) -> PatchClass:
     corrected = options.cross_tangent == "precise"
     sides = corners.shape[1]
+    bulge, alpha = shape.bulge[patches], shape.alpha[patches]
+    device = device_form(work, corners, uneven, options.cross_tangent, bulge if blended(options) else alpha)
     surface = Form(
         ("gregory", sides, corrected, uneven),
         partial(_surface_basis, sides, corrected, uneven),
         lambda rows: GregoryControls.build(
-            work, corners[rows], uneven, options.cross_tangent, shape.bulge[patches[rows]], shape.alpha[patches[rows]]
+            work, corners[rows], uneven, options.cross_tangent, bulge[rows], alpha[rows]
         ),
         points=sides,
+        device=device,
     )
     if options.normals == "exact":
         return PatchClass(sides, patches, surface)
-    blended = Form(
-        ("edge normals", sides), partial(edge_normal_basis, sides), lambda rows: NormalControls(work, corners[rows])
+    normals = Form(
+        ("edge normals", sides),
+        partial(edge_normal_basis, sides),
+        lambda rows: NormalControls(work, corners[rows]),
+        device=normal_form(device, sides, options.cross_tangent),
     )
-    return PatchClass(sides, patches, surface, blended)
+    return PatchClass(sides, patches, surface, normals)
 
 
 def _surface_basis(sides: int, corrected: bool, uneven: bool, points: Floats) -> Basis:
