@@ -10,8 +10,8 @@ W, and the edge's normal is C' x W.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +28,7 @@ from curvify.schemes.base import Form, PatchClass, Patches, bernstein_basis, ber
 from curvify.schemes.frames import Frame
 from curvify.schemes.patchwork import Patchwork
 from curvify.schemes.png1_basis import png1_columns
+from curvify.schemes.png1_device import NO_PLANE, device_construction, device_form, device_inputs
 from curvify.schemes.triangles import (
     TrianglePieces,
     all_corners,
@@ -42,8 +43,6 @@ from curvify.words import count_of
 
 NORMALS = ("exact", "smooth")
 CREASE_UNITS = ("absolute", "edge")
-#: A mean of two face normals that is shorter than this across the edge gives no plane.
-NO_PLANE = 1e-6
 #: A leg and a normal whose cross product is below this share of the leg are parallel.
 PARALLEL = 1e-9
 
@@ -86,23 +85,38 @@ def prepare(mesh: PolygonMesh | Coarse, options: Options | None = None) -> Patch
     pieces = triangle_pieces(coarse, features, creases | coarse.topology.nonmanifold)
     frame = pieces.frame
     curves = chord_curves(frame)
-    turns = quarter_turns(frame, curves, middle_planes(pieces))
+    planes = middle_planes(pieces)
+    turns = quarter_turns(frame, curves, planes)
     work = pieces.with_curves(curves, cross_fields(pieces, curves, turns))
     work.warnings += pieces.coarse.unused_marks(("kappa",), name)
     build = Construction(work, np.ascontiguousarray(np.moveaxis(turns, -1, 0)), pieces.facing, kappas)
     _bend_lifted_fields(build, frame)
     _note_folds(work, pieces)
+    smooth = smooth_fields(work, frame) if options.normals == "smooth" else None
+    turned = np.zeros(0, dtype=np.int64) if smooth is None else smooth.turned
+    inputs = partial(device_inputs, work, pieces.facing, frame.tangents, planes, build.lifts, turned)
+    work.construction = device_construction(work, inputs, smooth is not None)
+    return work.patches(_classes(build, smooth), triangle_sampling)
+
+
+def _classes(build: Construction, smooth: SmoothFields | None) -> list[PatchClass]:
+    """Triangles with smooth normals, and those with exact ones."""
+    work = build.work
     corners = all_corners(work)
 
     def surface(patches: Ints) -> Form:
-        return block_form("png1", png1_columns, lambda rows: build.control_points(corners[patches[rows]]), 21)
+        own = corners[patches]
+        return block_form(name, png1_columns, lambda rows: build.control_points(own[rows]), 21, device_form(work, own))
 
-    if options.normals == "smooth":
-        classes = _smooth_classes(work, frame, surface)
-    else:
-        every = np.arange(len(corners))
-        classes = [PatchClass(3, every, surface(every))]
-    return work.patches(classes, triangle_sampling)
+    every = np.arange(len(corners))
+    if smooth is None:
+        return [PatchClass(3, every, surface(every))]
+    plain, rest = every[~smooth.awkward], every[smooth.awkward]
+    classes = [
+        PatchClass(3, plain, surface(plain), quadratic_normals(work, smooth.middles, plain)),
+        PatchClass(3, rest, surface(rest)),
+    ]
+    return [patch_class for patch_class in classes if len(patch_class.patches)]
 
 
 def crease_lifts(coarse: Coarse, features: Features, options: Options) -> tuple[Bools, Floats]:
@@ -277,8 +291,19 @@ def _bend_lifted_fields(build: Construction, frame: Frame) -> None:
     work.fields = np.ascontiguousarray(np.moveaxis(fields, -1, 0))
 
 
-def _smooth_classes(work: Patchwork, frame: Frame, surface: Callable[[Ints], Form]) -> list[PatchClass]:
-    """Triangles with the smooth normals of section 3.3, and those where these could vanish, with exact ones.
+@record
+class SmoothFields:
+    """The smooth normals of section 3.3: control normals ``middles (3,N)`` of the sides, those sides ``turned (t,)``
+    that keep their exact normals, and the triangles ``awkward (T,)`` where smooth ones could vanish.
+    """
+
+    middles: Floats
+    turned: Ints
+    awkward: Bools
+
+
+def smooth_fields(work: Patchwork, frame: Frame) -> SmoothFields:
+    """Put smooth normals on the sides of a work.
 
     The quadratic normals on a side meet the exact one in its middle. They cannot vanish while the end normals are less
     than 90 degrees off that; other sides keep their exact normals.
@@ -297,12 +322,7 @@ def _smooth_classes(work: Patchwork, frame: Frame, surface: Callable[[Ints], For
         smooth = elevated(smooth, degree)
         smooth[turned] = exact[turned]
     work.fields = np.ascontiguousarray(np.moveaxis(smooth, -1, 0))
-    plain, rest = np.flatnonzero(~awkward), np.flatnonzero(awkward)
-    classes = [
-        PatchClass(3, plain, surface(plain), quadratic_normals(work, middles, plain)),
-        PatchClass(3, rest, surface(rest)),
-    ]
-    return [patch_class for patch_class in classes if len(patch_class.patches)]
+    return SmoothFields(middles, turned, awkward)
 
 
 def _note_folds(work: Patchwork, pieces: TrianglePieces) -> None:
