@@ -123,7 +123,8 @@ def refine_report(run: Run, layout: DenseLayout, recorder: Recorder) -> dict[str
     ``timings`` are seconds. ``g1`` is measured from each face's own derivatives, in degrees; null for a recursive
     scheme. ``vertex_deviation`` is the largest distance between a vertex of the input, rounded to the output's type,
     and the same vertex as written: 0 where the surface interpolates. ``vertex_rounding`` is how far that rounding moved
-    a vertex at most. ``volume_ratio`` is null for a mesh that is not closed or was trimmed, ``wedges`` after trimming,
+    a vertex at most. ``gpu`` tells what went there and back and where control vectors were built, null without one.
+    ``volume_ratio`` is null for a mesh that is not closed or was trimmed, ``wedges`` after trimming,
     ``bytes`` for an output that is not a file or a pipe.
     """
     request, surface = run.request, run.surface
@@ -148,6 +149,7 @@ def refine_report(run: Run, layout: DenseLayout, recorder: Recorder) -> dict[str
         },
         "timings": run.seconds,
         "bytes_sent_to_gpu": run.bytes_sent,
+        "gpu": run.traffic or None,
         "g1": continuity(surface.patches) if isinstance(surface, Surface) else None,
         "vertex_deviation": _number(recorder.deviation),
         "vertex_rounding": _number(recorder.rounding),

@@ -144,6 +144,7 @@ class Run:
     bytes: int | None = None
     backend: dict[str, Any] = field(default_factory=dict)
     bytes_sent: int = 0
+    traffic: dict[str, Any] = field(default_factory=dict)
     mask: Mask | None = None
     trimmed: tuple[int, int] | None = None
 
@@ -343,7 +344,9 @@ def _refine(run: Run, console: Console) -> None:
         console.explain(f"backend {_backend_name(run.backend)}, {count_of(run.threads, 'thread')}")
         with timed(run.seconds, "evaluate_and_write"):
             layout = _write(run, recorder, console, backend)
-        run.bytes_sent = backend.bytes_sent
+        run.bytes_sent, run.traffic = backend.bytes_sent, backend.traffic()
+    for text in _traffic_notes(run.traffic):
+        console.explain(text)
     console.explain(f"{request.target}: {_dense_sizes(run, layout)}" + (f", {size(run.bytes)}" if run.bytes else ""))
     console.explain(", ".join(f"{stage.replace('_', ' ')} {took:.3f} s" for stage, took in run.seconds.items()))
     if request.report is not None and recorder is not None:
@@ -364,6 +367,19 @@ def _recorder(run: Run) -> Recorder | None:
 def _backend_name(backend: dict[str, Any]) -> str:
     """A backend in messages: ``cpu``, ``gpu (device)``."""
     return f"{backend['name']} ({backend['renderer']})" if "renderer" in backend else str(backend["name"])
+
+
+def _traffic_notes(traffic: dict[str, Any]) -> list[str]:
+    """What went to a device and back, and what was left to the CPU, in words."""
+    if not traffic:
+        return []
+    sent = ", ".join(f"{kind} {size(number)}" for kind, number in traffic["sent"].items() if number)
+    patches = traffic["patches"]
+    return [
+        f"sent to the GPU: {sent or 'nothing'}; received {size(traffic['received'])}",
+        f"control vectors built on the GPU for {count_of(patches['built_on_gpu'], 'patch', 'patches')}, on the CPU for "
+        f"{patches['built_on_cpu']}; {patches['evaluated_on_cpu']} evaluated on the CPU",
+    ]
 
 
 def _write(run: Run, recorder: Recorder | None, console: Console, backend: Backend) -> DenseLayout:

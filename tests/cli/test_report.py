@@ -38,6 +38,7 @@ def test_the_report_of_a_closed_mesh(call, folder):
     assert report["counts"]["output"] == {"vertices": 2304, "wedges": 2304, "faces": 2304, "bytes": size}
     assert set(report["timings"]) == {"read", "prepare", "open_backend", "evaluate_and_write"}
     assert report["bytes_sent_to_gpu"] == 0
+    assert report["gpu"] is None
     assert report["g1"]["edges_measured"] == report["g1"]["edges_smooth"] == 72
     assert 0 <= report["g1"]["mean_degrees"] <= report["g1"]["max_degrees"] < 1e-6
     assert report["vertex_deviation"] == 0

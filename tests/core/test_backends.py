@@ -25,6 +25,7 @@ def test_small_work_looks_for_no_device(name, monkeypatch):
     with open_backend(name, backends.LARGE - 1) as backend:
         assert backend.describe() == {"name": "cpu"}
         assert backend.bytes_sent == 0
+        assert backend.traffic() == {}
 
 
 def test_auto_opens_nothing_where_no_device_file_is(monkeypatch):

@@ -24,15 +24,28 @@ def folder(tmp_path, monkeypatch, device):
 def test_refine_on_the_gpu(device, capsys):
     assert run(["refine", str(TORUS), "cpu.ply", "--backend", "cpu"]) == 0
     assert run(["refine", str(TORUS), "gpu.ply", "--backend", "gpu", "-v", "--report", "report.json"]) == 0
-    assert f"backend gpu ({device.renderer}), " in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert f"backend gpu ({device.renderer}), " in told
+    assert "sent to the GPU: vectors 864 bytes, indices " in told
+    assert "control vectors built on the GPU for 36 patches, on the CPU for 0; 0 evaluated on the CPU" in told
     report = json.loads(Path("report.json").read_text())
     assert report["backend"]["name"] == "gpu"
     assert report["backend"]["renderer"] == device.renderer
-    assert report["bytes_sent_to_gpu"] > 0
+    assert report["bytes_sent_to_gpu"] == sum(report["gpu"]["sent"].values()) > 0
+    assert report["gpu"]["sent"]["vectors"] == 24 * 36
+    assert report["gpu"]["sent"]["controls"] == 0
+    assert report["gpu"]["patches"] == {"built_on_gpu": 36, "built_on_cpu": 0, "evaluated_on_cpu": 0}
+    assert report["gpu"]["received"] > 0
     assert report["vertex_deviation"] == 0
     wanted, found = curvify.read("cpu.ply"), curvify.read("gpu.ply")
     assert np.array_equal(wanted.face_vertices, found.face_vertices)
     assert np.abs(wanted.positions - found.positions).max() < 1e-6
+
+
+def test_what_the_gpu_does_not_build_is_told(capsys):
+    assert run(["refine", str(TORUS), "out.ply", "--backend", "gpu", "--scheme", "blend", "-v"]) == 0
+    told = capsys.readouterr().err
+    assert "control vectors built on the GPU for 0 patches, on the CPU for 36; " in told
 
 
 def test_a_pipe_takes_the_same_bytes(capfdbinary):

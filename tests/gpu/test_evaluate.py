@@ -13,19 +13,15 @@ import numpy as np
 import pytest
 
 import curvify
+from agreement import ANGLE, POSITION, SAMPLES, check_close, creased, gaps
 from curvify import evaluate
-from curvify.gpu.evaluate import GpuBackend
 from curvify.jobs import dense_layout
 from curvify.mesh import PolygonMesh
 from curvify.sinks import ArraySink
 from curvify.weld import number_dense_mesh
-from surfaces import cube, degrees, diagonal, mixed_ball, noisy, polygon_patch, prism, rotation, torus
+from surfaces import cube, mixed_ball, noisy, polygon_patch, prism, rotation, torus
 
 ROOT = Path(__file__).parents[2]
-SAMPLES = sorted((ROOT / "sample_meshes").glob("*.obj"))
-#: What is asked for; and what single precision gives for well-shaped patches.
-POSITION, ANGLE = 1e-5, 0.05
-USUAL_POSITION, USUAL_ANGLE = 1e-6, 2e-3
 
 
 @pytest.fixture
@@ -40,24 +36,6 @@ def left(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     monkeypatch.setattr(evaluate, "fill_patches", watched)
     return counts
-
-
-def gaps(surface: curvify.Surface, level: int, gpu: GpuBackend, dtype: type = np.float64) -> tuple[float, float]:
-    """Largest distance over the diagonal and largest angle between the dense meshes of the two backends."""
-    wanted = surface.refine(level, dtype)
-    found = surface.refine(level, dtype, backend=gpu)
-    assert found.positions.dtype == wanted.positions.dtype == dtype
-    for name in ("faces", "face_wedges", "repeats", "source_faces"):
-        assert np.array_equal(getattr(found, name), getattr(wanted, name))
-    apart = np.linalg.norm(found.positions.astype(float) - wanted.positions.astype(float), axis=1)
-    angle = degrees(found.normals.astype(float), wanted.normals.astype(float))
-    return float(apart.max()) / diagonal(surface.patches.positions), float(angle.max())
-
-
-def check_close(found: tuple[float, float], most: tuple[float, float] = (USUAL_POSITION, USUAL_ANGLE)) -> None:
-    """Both gaps are small enough."""
-    assert found[0] <= most[0]
-    assert found[1] <= most[1]
 
 
 @pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
@@ -115,17 +93,6 @@ def test_far_away_single_precision_output_rounds_once(gpu):
     assert np.abs(found - wanted).max() <= 0.5 * np.spacing(np.float32(1e4)) * 1.001
 
 
-def creased() -> PolygonMesh:
-    """A cube with the normals of its faces: sharp at every edge."""
-    mesh = cube()
-    corners = [face.tolist() for face in np.split(mesh.face_vertices, mesh.face_offsets[1:-1])]
-    points = mesh.positions[mesh.face_vertices].reshape(-1, 4, 3)
-    normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 1])
-    sharp = PolygonMesh.from_faces(mesh.positions, corners)
-    sharp.corner_normals = np.repeat(normals / np.linalg.norm(normals, axis=1, keepdims=True), 4, axis=0)
-    return sharp
-
-
 @pytest.mark.parametrize("make", [mixed_ball, creased], ids=["polygons", "quads"])
 def test_blending_surfaces_are_evaluated_on_the_device(make, gpu, left):
     surface = curvify.surface(make(), "blend", sharp_angle=80)
@@ -180,8 +147,8 @@ def test_a_surface_finds_the_backend_by_name(gpu):
     assert np.array_equal(surface.refine(3, backend="gpu").normals, surface.refine(3, backend=gpu).normals)
 
 
-@pytest.mark.parametrize("version", ["3.3", "4.1"])
-def test_devices_without_compute_shaders_use_transform_feedback(version, gpu):
+@pytest.mark.parametrize(("version", "every"), [("3.3", 1), ("4.1", 3)])
+def test_devices_without_compute_shaders_use_transform_feedback(version, every, gpu):
     """In a process of its own: the version of a driver cannot be changed in this one."""
     if "Mesa" not in gpu.device.version:
         pytest.skip("only Mesa can be told to be an older version")
@@ -190,16 +157,16 @@ import sys
 sys.path.insert(0, {str(ROOT / "tests")!r})
 import numpy as np
 import curvify
+from agreement import SCHEMES, check_close, creased, gaps
 from curvify.backends import open_backend
-from surfaces import degrees, mixed_ball, prism
+from surfaces import mixed_ball, prism
 with open_backend("gpu", 0) as gpu:
     assert not gpu.device.compute, gpu.describe()
-    for mesh in (mixed_ball(), prism(12)):
-        for normals in ("exact", "paper"):
-            surface = curvify.surface(mesh, normals=normals)
-            a, b = surface.refine(4), surface.refine(4, backend=gpu)
-            assert np.abs(a.positions - b.positions).max() < {USUAL_POSITION}
-            assert degrees(a.normals, b.normals).max() < {USUAL_ANGLE}
+    for mesh in (mixed_ball(), creased()):
+        for scheme, options in SCHEMES[::{every}]:
+            check_close(gaps(curvify.surface(mesh, scheme, sharp_angle=80, **options), 2, gpu))
+    assert gpu.traffic()["patches"]["built_on_cpu"] == 0
+    check_close(gaps(curvify.surface(mixed_ball(), "blend"), 2, gpu))
 """
     environment = os.environ | {"MESA_GL_VERSION_OVERRIDE": version}
     ended = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
