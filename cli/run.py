@@ -374,11 +374,12 @@ def _traffic_notes(traffic: dict[str, Any]) -> list[str]:
     if not traffic:
         return []
     sent = ", ".join(f"{kind} {size(number)}" for kind, number in traffic["sent"].items() if number)
-    patches = traffic["patches"]
+    patches, edges = traffic["patches"], traffic["edges"]
+    left = count_of(patches["evaluated_on_cpu"], "patch", "patches"), count_of(edges["evaluated_on_cpu"], "edge")
     return [
         f"sent to the GPU: {sent or 'nothing'}; received {size(traffic['received'])}",
         f"control vectors built on the GPU for {count_of(patches['built_on_gpu'], 'patch', 'patches')}, on the CPU for "
-        f"{patches['built_on_cpu']}; {patches['evaluated_on_cpu']} evaluated on the CPU",
+        f"{patches['built_on_cpu']}; evaluated on the CPU: {', '.join(left)}",
     ]
 
 

@@ -48,6 +48,7 @@ class GpuBackend:
         self.blend = BlendDevice(self.products)
         self._lock = threading.Lock()
         self._patches = {"built_on_gpu": 0, "built_on_cpu": 0, "evaluated_on_cpu": 0}
+        self._edges = {"evaluated_on_gpu": 0, "evaluated_on_cpu": 0}
         if not (software or self.device.hardware):
             self.close()
             raise DeviceError(f"{self.device.renderer} is no GPU")
@@ -73,12 +74,19 @@ class GpuBackend:
         return {"name": self.name} | {name: getattr(self.device, name) for name in names}
 
     def traffic(self) -> dict[str, Any]:
-        """So far: bytes ``sent`` by kind and ``received``, and for how many ``patches`` control vectors were built
-        where; those that single precision could not do were evaluated on the CPU.
+        """So far: bytes ``sent`` by kind and ``received``; for how many ``patches`` control vectors were built where,
+        and how many patches and ``edges``, from each side, were evaluated on the CPU.
         """
         memory = self.products.memory
         with self._lock:
-            return {"sent": dict(memory.sent), "received": memory.received, "patches": dict(self._patches)}
+            counts = {"patches": dict(self._patches), "edges": dict(self._edges)}
+        return {"sent": dict(memory.sent), "received": memory.received, **counts}
+
+    def _count(self, counts: dict[str, int], done: str, number: int, left: int) -> None:
+        """Count what was ``done`` here and what was left to the CPU."""
+        with self._lock:
+            counts[done] += number - left
+            counts["evaluated_on_cpu"] += left
 
     def edges(self, edges: Edges, ids: Ints, fields: Ints, t: Floats) -> tuple[Floats, Floats]:
         """Positions and unit normals ``(3,e,m)`` at ``t (m,)`` on edges ``ids (e,)`` with normal fields ``(e,)``; those
@@ -89,9 +97,11 @@ class GpuBackend:
         elif len(t) and isinstance(edges, BlendEdges):
             positions, normals = self.blend.edges(edges, ids, fields, t)
         else:
+            self._count(self._edges, "evaluated_on_gpu", len(ids), len(ids))
             return edges.points(ids, t), edges.normals(fields, t)
         places, directions = positions.transpose(2, 0, 1), normals.astype(np.float64).transpose(2, 0, 1)
         lost = np.flatnonzero(_without_normal(normals))
+        self._count(self._edges, "evaluated_on_gpu", len(ids), len(lost))
         if len(lost):
             places[:, lost], directions[:, lost] = edges.points(ids[lost], t), edges.normals(fields[lost], t)
         return places, directions
@@ -163,9 +173,7 @@ class GpuBackend:
         left |= _without_normal(normals)
         built = isinstance(surface, Form) and surface.device and self._can_build(surface.device.construction)
         part = np.flatnonzero(left)
-        with self._lock:
-            self._patches["built_on_gpu" if built else "built_on_cpu"] += len(rows) - len(part)
-            self._patches["evaluated_on_cpu"] += len(part)
+        self._count(self._patches, "built_on_gpu" if built else "built_on_cpu", len(rows), len(part))
         if len(part):
             exact = np.empty((2, len(part), *positions.shape[1:]))
             evaluate.fill_patches(patches, patch_class, rows[part], sampling, level, tolerance, exact[0], exact[1])
@@ -209,7 +217,7 @@ class GpuBackend:
             for block in tables.blocks(form, points, grid, 0, kind.orders)
             if block.basis is not None
         ]
-        step = self.products.most_patches(max(block.samples for block in blocks), device.most_texels(grid[0]))
+        step = self.products.most_patches(len(points), device.most_texels(grid[0]))
         for begin in range(0, len(rows), step):
             part = np.arange(begin, min(begin + step, len(rows)))
             make = partial(self.products.patches_of, device, rows[part], grid[0])
@@ -237,7 +245,7 @@ class GpuBackend:
                 for block in tables.blocks(form, points, grid, count, kind.orders)
             ] if len(chosen) else []
             columns = controls.linear.shape[2] + nodes.shape[2] * nodes.shape[3]
-            step = self.products.most_patches(min(len(points), tables.SAMPLES), columns)
+            step = self.products.most_patches(len(points), columns)
             for begin in range(0, len(chosen), step):
                 part = chosen[begin : begin + step]
                 linear, origin = _relative(controls.linear[:, part], form.points)

@@ -137,7 +137,7 @@ class DeviceForm:
     def most_texels(self, size: int) -> int:
         """Texels of the longest list that a patch with so many sides needs on the way."""
         made = (step.texels * (size if step.sides else 1) for step in self.passes)
-        return max(self.texels(size), *made) if self.passes else self.texels(size)
+        return max([self.texels(size), *made])
 
     def origins(self, rows: Ints) -> Floats:
         """First corners ``(f,3)`` of some patches: what the device's control vectors are relative to."""

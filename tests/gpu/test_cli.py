@@ -27,7 +27,8 @@ def test_refine_on_the_gpu(device, capsys):
     told = capsys.readouterr().err
     assert f"backend gpu ({device.renderer}), " in told
     assert "sent to the GPU: vectors 864 bytes, indices " in told
-    assert "control vectors built on the GPU for 36 patches, on the CPU for 0; 0 evaluated on the CPU" in told
+    assert "control vectors built on the GPU for 36 patches, on the CPU for 0; " in told
+    assert "evaluated on the CPU: 0 patches, 0 edges" in told
     report = json.loads(Path("report.json").read_text())
     assert report["backend"]["name"] == "gpu"
     assert report["backend"]["renderer"] == device.renderer
@@ -35,6 +36,7 @@ def test_refine_on_the_gpu(device, capsys):
     assert report["gpu"]["sent"]["vectors"] == 24 * 36
     assert report["gpu"]["sent"]["controls"] == 0
     assert report["gpu"]["patches"] == {"built_on_gpu": 36, "built_on_cpu": 0, "evaluated_on_cpu": 0}
+    assert report["gpu"]["edges"] == {"evaluated_on_gpu": 72, "evaluated_on_cpu": 0}
     assert report["gpu"]["received"] > 0
     assert report["vertex_deviation"] == 0
     wanted, found = curvify.read("cpu.ply"), curvify.read("gpu.ply")
@@ -46,6 +48,8 @@ def test_what_the_gpu_does_not_build_is_told(capsys):
     assert run(["refine", str(TORUS), "out.ply", "--backend", "gpu", "--scheme", "blend", "-v"]) == 0
     told = capsys.readouterr().err
     assert "control vectors built on the GPU for 0 patches, on the CPU for 36; " in told
+    assert run(["refine", str(TORUS), "out.ply", "--backend", "gpu", "--weld-normals", "-v"]) == 0
+    assert "; evaluated on the CPU: 0 patches, 72 edges" in capsys.readouterr().err
 
 
 def test_a_pipe_takes_the_same_bytes(capfdbinary):
