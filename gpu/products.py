@@ -161,12 +161,11 @@ class Products:
     def can_build(self, construction: Construction) -> bool:
         """Whether the device has room for the edges of a surface."""
         inputs = construction.inputs
-        longest = max(len(inputs.positions), len(inputs.corners), len(inputs.sides) * EDGE_TEXELS)
+        texels = max(EDGE_TEXELS, construction.field_texels)
+        longest = max(len(inputs.positions), len(inputs.corners), len(inputs.sides) * texels)
         return longest <= self.memory.most_texels
 
-    def launch(
-        self, make: Callable[[], Controls], kind: Kind, tables: list[Table]
-    ) -> list[Launched]:
+    def launch(self, make: Callable[[], Controls], kind: Kind, tables: list[Table]) -> list[Launched]:
         """Let the device make controls and multiply each of the tables with them. Raises DeviceError."""
         return self.run(self._launch, make, kind, tables)
 

@@ -27,7 +27,7 @@ Side to_side(mat3x4 field, vec4 start, vec3 end) {
 }
 
 // h and h'.
-vec2 blend_step(float t) {
+vec2 _step(float t) {
 #if defined(PRECISE)
     return vec2(1.0 - t, -1.0);
 #else
@@ -39,7 +39,7 @@ vec2 blend_step(float t) {
 }
 
 // 1 + K b and its derivative.
-vec2 fullness(float gain, float t) {
+vec2 _fullness(float gain, float t) {
     float b = 4.0 * t * (1.0 - t), b_slope = 4.0 - 8.0 * t;
 #if defined(PRECISE)
     return vec2(1.0 + gain * b, gain * b_slope);
@@ -48,16 +48,16 @@ vec2 fullness(float gain, float t) {
 #endif
 }
 
-void blend_with_slope(Side side, float t, out vec3 y, out vec3 y_slope) {
-    vec2 h = blend_step(t);
+void _blend_with_slope(Side side, float t, out vec3 y, out vec3 y_slope) {
+    vec2 h = _step(t);
     y = side.end + h.x * (side.start - side.end);
     y_slope = h.y * (side.start - side.end);
     project_with_slope(y, y_slope, bernstein_basis(t) * side.field, bernstein_slopes(t) * side.field);
 }
 
 void field_derivatives(Side side, float t, out vec3 value, out vec3 slope) {
-    blend_with_slope(side, t, value, slope);
-    vec2 factor = fullness(side.gain, t);
+    _blend_with_slope(side, t, value, slope);
+    vec2 factor = _fullness(side.gain, t);
     slope = factor.x * slope + factor.y * value;
     value *= factor.x;
 }
@@ -71,7 +71,7 @@ struct Side {
     vec3 first, last;
 };
 
-void direction_with_slope(
+void _direction(
     Side side, float t, out vec3 x, out vec3 x_slope, out vec3 direction, out vec3 slope, out vec3 n, out vec3 n_slope
 ) {
     vec4 basis = bernstein_basis(t), slopes = bernstein_slopes(t);
@@ -90,7 +90,7 @@ void direction_with_slope(
 
 void field_derivatives(Side side, float t, out vec3 value, out vec3 slope) {
     vec3 x, x_slope, direction, direction_slope, n, n_slope;
-    direction_with_slope(side, t, x, x_slope, direction, direction_slope, n, n_slope);
+    _direction(side, t, x, x_slope, direction, direction_slope, n, n_slope);
     float square = dot(x, x), size = dot(direction, direction);
     float ratio = square > 0.0 && size > 0.0 ? sqrt(square / size) : 0.0;
     float ratio_slope = ratio > 0.0 ? ratio * (dot(x, x_slope) / square - dot(direction, direction_slope) / size) : 0.0;

@@ -87,35 +87,37 @@ vec3 center_point(int first, float bulge, out bool sure) {
 #if defined(PRECISE) || defined(SMOOTH)
 
 // T(0) and T(1) as the neighboring edges ask for them.
-Side patch_side(int first, int k) {
+Side patch_sides(int first, int k) {
     vec3 start = 3.0 * last_leg(side_curve(first + around(k - 1)));
     vec3 end = 3.0 * first_leg(side_curve(first + around(k + 1)));
     return Side(side_field(first + k), start, end, 0.0);
 }
 
 // Fullness from the distance of the center point `target`, which is given from the first corner.
-float precise_gain(Side side, int first, int k, vec3 target) {
+Side precise_tangent(Side side, int first, int k, vec3 target) {
     if (size == 3) {
-        return 0.0;
+        return side;
     }
     vec3 middle, unused;
-    blend_with_slope(side, 0.5, middle, unused);
+    _blend_with_slope(side, 0.5, middle, unused);
     mat3x4 curve = side_curve(first + k);
     vec3 reach = target - corner_point(first, first + k) - bernstein_basis(0.5) * curve;
     float far = length(reach), speed = length(middle);
     float cosine = max(far * speed > 0.0 ? dot(reach, middle) / (far * speed) : 0.0, 0.5);
     float turn = sin(3.14159265358979 / float(size));
     float ratio = speed > 0.0 ? far / (speed * cosine) : 0.0;
-    return clamp((size == 4 ? 0.15 : 0.3) * (4.0 * turn * turn * ratio - 1.0), -0.5, 1.0);
+    side.gain = clamp((size == 4 ? 0.15 : 0.3) * (4.0 * turn * turn * ratio - 1.0), -0.5, 1.0);
+    return side;
 }
 
 // Fullness from what the projection takes away in the middle.
-float smooth_gain(Side side, float bulge) {
+Side smooth_tangent(Side side, float bulge) {
     vec3 middle, unused;
-    blend_with_slope(side, 0.5, middle, unused);
+    _blend_with_slope(side, 0.5, middle, unused);
     float mean = (length(side.start) + length(side.end)) / 2.0;
     float kept = mean > 0.0 ? dot(middle, middle) / (mean * mean) : 0.0;
-    return (size <= 4 ? 0.5 : 1.0) * clamp((1.0 - kept) / 2.0, 0.0, 0.2) + bulge;
+    side.gain = (size <= 4 ? 0.5 : 1.0) * clamp((1.0 - kept) / 2.0, 0.0, 0.2) + bulge;
+    return side;
 }
 
 void store_side(Side side, bool sure, out vec4 texels[SIDE_TEXELS]) {
@@ -127,22 +129,21 @@ void store_side(Side side, bool sure, out vec4 texels[SIDE_TEXELS]) {
 }
 
 Side cross_tangents(int row, int first, int k, out bool sure) {
-    Side side = patch_side(first, k);
+    Side side = patch_sides(first, k);
 #if defined(PRECISE)
     vec4 target = texelFetch(targets, place(row), 0);
-    side.gain = precise_gain(side, first, k, target.xyz);
     sure = target.w != 0.0;
+    return precise_tangent(side, first, k, target.xyz);
 #else
-    side.gain = smooth_gain(side, shape_of(row));
     sure = true;
+    return smooth_tangent(side, shape_of(row));
 #endif
-    return side;
 }
 
 #else
 
 // Normal of side k: marked, or the mean of its ends'.
-vec3 side_normal(int first, int k) {
+vec3 side_normals(int first, int k) {
     int row = feature_at(corner_at(first + k) >> 1);
 #if VECTORS > 3
     if (row >= 0 && vector_at(row, 3) != vec3(0.0)) {
@@ -166,7 +167,7 @@ vec3 polygon_normal(int first) {
 
 // Equations (8) and (9): n_int through the neighboring sides' normals, as a quadratic.
 mat3x4 guides_of(int first, int k, float alpha) {
-    vec3 before = side_normal(first, around(k - 1)), after = side_normal(first, around(k + 1));
+    vec3 before = side_normals(first, around(k - 1)), after = side_normals(first, around(k + 1));
 #if defined(LINEAR)
     return bezier(before, (before + after) / 2.0, after, vec3(0.0));
 #else
@@ -179,7 +180,7 @@ bool is_regular(Side side) {
     vec2 least = vec2(1e30), most = vec2(0.0);
     for (int i = 0; i < 17; i++) {
         vec3 x, x_slope, direction, slope, n, n_slope;
-        direction_with_slope(side, float(i) / 16.0, x, x_slope, direction, slope, n, n_slope);
+        _direction(side, float(i) / 16.0, x, x_slope, direction, slope, n, n_slope);
         vec2 sizes = vec2(dot(x, x), dot(direction, direction));
         least = min(least, sizes);
         most = max(most, sizes);
