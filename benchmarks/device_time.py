@@ -91,7 +91,15 @@ def watch_device(device: Device) -> DeviceTime:
         return 0 if data is None else memoryview(data).nbytes
 
     def texture(size: Any, components: int, data: Any = None, *rest: Any, **named: Any) -> Any:
-        return watch.time("upload", size_of(data), lambda: ctx.texture(size, components, data, *rest, **named))
+        made = watch.time("upload", size_of(data), lambda: ctx.texture(size, components, data, *rest, **named))
+
+        def write(source: Any, *inner: Any, **options: Any) -> Any:
+            """From memory, or from a buffer on the device."""
+            inside = isinstance(source, Watched)
+            part, moved = ("kernel", 0) if inside else ("upload", size_of(source))
+            return watch.time(part, moved, lambda: made.write(bare(source), *inner, **options))
+
+        return Watched(made, write=write)
 
     def buffer(data: Any = None, **named: Any) -> Any:
         made = watch.time("upload", size_of(data), lambda: ctx.buffer(data, **named)) if data else ctx.buffer(**named)
