@@ -25,6 +25,8 @@ CREASE_TURN = 100.0
 
 #: Straight edges at a vertex whose directions span less than this (the square of an angle) are one line, or one plane.
 ONE_LINE = 1e-14
+#: Normals whose cosine with a tangent is above this are not perpendicular to it.
+TILTED = 1e-6
 #: Normals of a crease's two sides whose cross product is shorter than this do not tell where the crease runs.
 NO_TURN = 1e-7
 
@@ -82,7 +84,7 @@ def resolve_features(
     """
     normals, computed = _starting_normals(topology, positions, area, sectors, given, marks)
     sharp = _sharp_ends(topology, sectors)
-    lines, turned = _line_tangents(topology, positions, sharp, marks.straight)
+    lines, turned = line_tangents(topology, positions, sharp, marks.straight)
     lined = np.linalg.norm(lines, axis=1) > 0
     tangled = _touched(topology, topology.nonmanifold)
     turned[topology.vertices[~computed]] = False
@@ -94,7 +96,9 @@ def resolve_features(
     if ((marks.crease > 0) & (marks.crease < 1)).any():
         _soften(topology, normals, fans, sectors, sharp, marks.crease)
         straight.apply(normals)
-    tangents, bending = _end_tangents(topology, positions, area, normals, lines, sharp, corners, marks, directions)
+    ends = _edge_ends(topology, positions, area, normals, sharp)
+    points = corner_points(topology, sharp, marks.corner)
+    tangents, bending = end_tangents(ends, lines, sharp, corners, points, marks, directions)
     fitted, adjusted = _fit_normals(topology, normals, tangents, corners)
     return Features(fitted, tangents, bending, sharp, corners, adjusted, normals)
 
@@ -248,7 +252,7 @@ def _touched(topology: Topology, edges: Bools) -> Bools:
     return touched
 
 
-def _line_tangents(topology: Topology, positions: Floats, sharp: Bools, straight: Bools) -> tuple[Floats, Bools]:
+def line_tangents(topology: Topology, positions: Floats, sharp: Bools, straight: Bools) -> tuple[Floats, Bools]:
     """Tangent ``(V,3)`` of the line through each vertex, zero where none, and where a crease turns too much.
 
     A line passes where exactly two boundary edges meet (and more than one face), or exactly two creases and
@@ -280,34 +284,62 @@ def _line_tangents(topology: Topology, positions: Floats, sharp: Bools, straight
     return lines, turned
 
 
-def _end_tangents(
-    topology: Topology,
-    positions: Floats,
-    area: Floats,
-    normals: Floats,
+@record
+class EdgeEnds:
+    """Edges and the normals at their ends, in the edges' direction.
+
+    ``edges (E,2)`` and ``chord (E,3)``; ``normals (E,2,3)`` of the first face; ``several (s,)`` the edges that may have
+    other normals on their other side, ``others (s,2,3)``; ``beside (E,3)`` the faces' area vectors, added; ``interior
+    (E,)`` as in `Topology`.
+    """
+
+    edges: Ints
+    chord: Floats
+    normals: Floats
+    several: Ints
+    others: Floats
+    beside: Floats
+    interior: Bools
+
+
+def _edge_ends(topology: Topology, positions: Floats, area: Floats, normals: Floats, sharp: Bools) -> EdgeEnds:
+    """The ends of the mesh's edges, in canonical direction."""
+    chord = take_rows(positions, topology.edges[:, 1]) - take_rows(positions, topology.edges[:, 0])
+    first, last = topology.first, topology.last
+    several = np.flatnonzero(sharp.any(axis=1) | topology.nonmanifold)
+    others = end_normals(topology, normals, last[several])
+    beside = take_rows(area, topology.faces[first]) + take_rows(area, topology.faces[last])
+    return EdgeEnds(
+        topology.edges, chord, end_normals(topology, normals, first), several, others, beside, topology.interior
+    )
+
+
+def end_tangents(
+    ends: EdgeEnds,
     lines: Floats,
     sharp: Bools,
     corners: Bools,
+    points: tuple[Bools, Floats],
     marks: ResolvedMarks,
     directions: Directions,
 ) -> tuple[Floats, Floats]:
-    """Unit tangents ``(E,2,3)`` and bending normals ``(E,3)`` of all edges."""
-    chord = take_rows(positions, topology.edges[:, 1]) - take_rows(positions, topology.edges[:, 0])
-    first, last = topology.first, topology.last
-    mean = end_normals(topology, normals, first)
-    several = np.flatnonzero(sharp.any(axis=1) | topology.nonmanifold)
-    one, other = mean[several], end_normals(topology, normals, last[several])
+    """Unit tangents ``(E,2,3)`` and bending normals ``(E,3)`` of edges; the normals of the ends are worked on in place.
+
+    ``sharp (E,2)``; of vertices the ``lines (V,3)`` through them, the ``corners (V,)``, and the ``points`` as from
+    ``corner_points``.
+    """
+    chord, several, mean = ends.chord, ends.several, ends.normals
+    one, other = mean[several], ends.others
     mean[several] = np.where((one == other).all(axis=2, keepdims=True), one, (one + other) / 2)
-    beside = take_rows(area, topology.faces[first]) + take_rows(area, topology.faces[last])
-    bending = bending_normals(chord, mean[:, 0], mean[:, 1], beside)
+    bending = bending_normals(chord, mean[:, 0], mean[:, 1], ends.beside)
     mean[several] = unit(mean[several])
     bent = np.flatnonzero(marks.edge_normals.any(axis=1))
     bending[bent] = _marked_bending(marks.edge_normals[bent], bending[bent], chord[bent])
-    pointed, weight = _points(topology, sharp, marks.corner)
+    pointed, weight = points
     tangents = np.empty((3, 2, len(chord))).transpose(2, 1, 0)
     lined: Bools = np.asarray(lines.any(axis=1))
     for end in (0, 1):
-        at = topology.edges[:, end]
+        at = ends.edges[:, end]
         tangents[:, end] = directions(chord, mean[:, end], bending)
         tangents[bent, end] = smooth_tangents(chord[bent], mean[bent, end], bending[bent])
         split = np.flatnonzero(sharp[several, end])
@@ -316,18 +348,18 @@ def _end_tangents(
         tangents[rows, end] = _crease_tangents(
             along, one[split, end], other[split, end], mean[rows, end], lines[at[rows]]
         )
-        rim = np.flatnonzero(~topology.interior & lined[at])
+        rim = np.flatnonzero(~ends.interior & lined[at])
         line = lines[at[rim]]
         line *= np.where(dot(line, chord[rim]) < 0, -1.0, 1.0)
         tangents[rim, end] = unit(line - dot(line, mean[rim, end]) * mean[rim, end])
-        stiff = np.flatnonzero(pointed[at] | (corners[at] & (sharp[:, end] | ~topology.interior)))
+        stiff = np.flatnonzero(pointed[at] | (corners[at] & (sharp[:, end] | ~ends.interior)))
         share, along = weight[at[stiff], None], unit(chord[stiff])
         tangents[stiff, end] = unit((1 - share) * tangents[stiff, end] + share * along)
     tangents[marks.straight] = unit(chord[marks.straight])[:, None]
     return tangents, bending
 
 
-def _points(topology: Topology, sharp: Bools, marked: Floats) -> tuple[Bools, Floats]:
+def corner_points(topology: Topology, sharp: Bools, marked: Floats) -> tuple[Bools, Floats]:
     """Corner vertices all of whose edges leave along their chords ``(V,)``, and the share of the chords ``(V,)``.
 
     Those marked with a sharpness ``(V,)`` that fewer than two creases or boundaries run into: the tip of a cone.
@@ -384,21 +416,28 @@ def _fit_normals(
     rows = tangents.transpose(2, 1, 0).reshape(3, -1).T  # those at the starts of all edges, then those at their ends
     leave, arrive = topology.edge + count * ~forward, (topology.edge + count * forward)[before]
     out, back = take_rows(rows, leave), take_rows(rows, arrive)
-    tilt = np.maximum(np.abs(dot(normals, out)), np.abs(dot(normals, back)))[:, 0]
     own = corners[topology.vertices]
-    refit = own | (tilt > 1e-6)
+    refit = own | is_tilted(normals, out, back)
     if not refit.any():
         return normals, 0
     out = out[refit] * np.where(forward[refit], 1.0, -1.0)[:, None]
     back = back[refit] * np.where(forward[before[refit]], -1.0, 1.0)[:, None]
+    normals = normals.copy()
+    normals[refit] = upright_normals(normals[refit], out, back)
+    return normals, int((refit & ~own).sum())
+
+
+def is_tilted(normals: Floats, out: Floats, back: Floats) -> Bools:
+    """Corners ``(C,)`` whose ``normals`` are not perpendicular to the unit tangents ``out`` and ``back (C,3)``."""
+    return np.maximum(np.abs(dot(normals, out)), np.abs(dot(normals, back)))[:, 0] > TILTED
+
+
+def upright_normals(normals: Floats, out: Floats, back: Floats) -> Floats:
+    """Unit vectors ``(k,3)`` perpendicular to the unit tangents ``out`` and ``back (k,3)``, on the side of ``normals``."""
     upright = cross(out, back)
-    old = normals[refit]
-    flattened = old - dot(old, out) * out
+    flattened = normals - dot(normals, out) * out
     along = np.linalg.norm(flattened, axis=1, keepdims=True) < 1e-6
     flattened = np.where(along, perpendicular(out), unit(flattened))
     collinear = np.linalg.norm(upright, axis=1, keepdims=True) < 1e-6
-    fitted = unit(upright) * np.where(dot(upright, old) < 0, -1.0, 1.0)
-    fitted = np.where(collinear, flattened, fitted)
-    normals = normals.copy()
-    normals[refit] = fitted
-    return normals, int((refit & ~own).sum())
+    fitted = unit(upright) * np.where(dot(upright, normals) < 0, -1.0, 1.0)
+    return np.where(collinear, flattened, fitted)

@@ -198,8 +198,12 @@ class GregoryControls:
         cls, work: Patchwork, corners: Ints, uneven: bool, kind: str, bulge: Floats, alpha: Floats
     ) -> GregoryControls:
         """Controls of the patches with the given corners ``(f,n)``, ``bulge`` and ``alpha (f,)``."""
-        n = corners.shape[1]
-        points, tangent, target = cross_tangents(work, corners, kind, bulge, alpha)
+        return cls.of(*cross_tangents(work, corners, kind, bulge, alpha), uneven)
+
+    @classmethod
+    def of(cls, points: Floats, tangent: CrossTangent, target: Floats | None, uneven: bool) -> GregoryControls:
+        """Controls from corner ``points (3,f,n)``, cross tangents and, for ``precise``, center points ``(3,f)``."""
+        n = points.shape[2]
         t = np.array([0.0, 1.0])
         value, slope = tangent.field_derivatives(t)
         middle = tangent.fields(np.array([0.5]))[..., 0]
@@ -211,7 +215,7 @@ class GregoryControls:
         blocks = [points, *legs, slope[..., 0], slope[..., 1]]
         if corrected and n != 4:
             blocks.append(middle)
-        rows = np.zeros((n * len(blocks) + corrected, 3, len(corners)))
+        rows = np.zeros((n * len(blocks) + corrected, 3, points.shape[1]))
         for i, block in enumerate(blocks):
             rows[n * i : n * (i + 1)] = block.transpose(2, 0, 1)
         if target is not None:
@@ -251,10 +255,14 @@ def side_normals(work: Patchwork, corners: Ints) -> Floats:
 def patch_sides(work: Patchwork, corners: Ints) -> tuple[Floats, Sides]:
     """Corner points ``(3,f,n)`` and side data of patches."""
     points = work.corner_points(corners)
-    curves, fields = work.side_curves(corners), work.side_fields(corners)
+    return points, sides_of(points, work.side_curves(corners), work.side_fields(corners))
+
+
+def sides_of(points: Floats, curves: Floats, fields: Floats) -> Sides:
+    """Side data of patches with corners ``(3,f,n)`` from ``curves`` and ``fields (3,f,n,4)``."""
     start = 3 * (behind(curves[..., 2]) - points)
     end = 3 * ahead(curves[..., 1] - points)
-    return points, Sides(curves, fields, start, end)
+    return Sides(curves, fields, start, end)
 
 
 def precise_tangent(sides: Sides, target: Floats) -> ProjectedBlend:
