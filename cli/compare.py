@@ -27,25 +27,6 @@ EXAMPLES = (
 HEAT_FORMATS = ("png", "ply", "obj", "off", "glb")
 
 
-class Length(click.ParamType):  # type: ignore[type-arg,unused-ignore]
-    """A length in units of the file, or with ``%`` a share of the diagonal: ``(number, is_share)``."""
-
-    name = "length"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, bool]:
-        """The number and whether it is a share."""
-        if isinstance(value, tuple):
-            return value
-        share = value.endswith("%")
-        try:
-            number = float(value[:-1]) / 100 if share else float(value)
-        except ValueError:
-            number = -1.0
-        if not 0 <= number < float("inf"):
-            self.fail(f"'{value}' is not a length; give a number from 0 on, or a share of the diagonal such as 0.01%")
-        return number, share
-
-
 @click.command(name="compare", cls=Command, examples=EXAMPLES, short_help=COMMANDS["compare"])
 @click.argument("a", metavar="A", type=options.FILE)
 @click.argument("b", metavar="B", type=options.FILE)
@@ -53,7 +34,7 @@ class Length(click.ParamType):  # type: ignore[type-arg,unused-ignore]
     options.option(
         "Tolerances",
         "--tolerance",
-        type=Length(),
+        type=options.Length(),
         metavar="T",
         help="How far points may be apart, in units of the file, or as a share of the diagonal of A: 0.001%. Without "
         "it every number must be equal.",

@@ -14,6 +14,7 @@ from curvify import __version__
 COMMANDS = {
     "refine": "Turn a coarse polygon mesh into a dense mesh of a smooth surface.",
     "simplify": "Turn a dense triangle mesh into few convex polygons that refine back to it.",
+    "fit": "Fit a coarse mesh to a dense one, so that its surface comes back to it.",
     "batch": "Refine many meshes in parallel.",
     "info": "Show what a mesh is like and what refine would do with it.",
     "check": "Check that a mesh is what it should be; the exit code tells.",

@@ -45,6 +45,25 @@ DEGREES = Number(min=0, max=180)
 MOST_FACES = 10_000_000
 
 
+class Length(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """A length in units of the file, or with ``%`` a share of the diagonal: ``(number, is_share)``."""
+
+    name = "length"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, bool]:
+        """The number and whether it is a share."""
+        if isinstance(value, tuple):
+            return value
+        share = value.endswith("%")
+        try:
+            number = float(value[:-1]) / 100 if share else float(value)
+        except ValueError:
+            number = -1.0
+        if not 0 <= number < float("inf"):
+            self.fail(f"'{value}' is not a length; give a number from 0 on, or a share of the diagonal such as 0.01%")
+        return number, share
+
+
 def option(heading: str, *names: str, **attributes: Any) -> Callable[[Function], Function]:
     """An option under a heading of the help."""
     return click.option(*names, cls=Option, heading=heading, **attributes)
@@ -234,6 +253,37 @@ simplify = option(
     type=POSITIVE,
     metavar="N",
     help="First turn IN into N polygons, as 'curvify simplify --faces N' does.",
+)
+FITS = click.Choice(["none", "normals", "full"])
+fit = option(
+    SIMPLIFYING,
+    "--fit",
+    type=FITS,
+    default="full",
+    show_default=True,
+    help="What is fitted to IN so that refining OUT comes back to it: vertices and normals, normals only, or nothing.",
+)
+fit_first = option(
+    SIMPLIFYING,
+    "--fit",
+    type=FITS,
+    help="What is fitted as with 'curvify simplify'  [default: full for gregory, none for other schemes]",
+)
+fit_mode = option(
+    SIMPLIFYING,
+    "--fit",
+    type=click.Choice(["normals", "full"]),
+    default="full",
+    show_default=True,
+    help="What is fitted: vertices and normals, or normals only.",
+)
+max_error = option(
+    SIMPLIFYING,
+    "--max-error",
+    type=Length(),
+    metavar="E",
+    help="Spend up to a fifth of the faces where the refined surface is farther from IN than this, in units of the "
+    "file or as a share of the diagonal: 0.2%.",
 )
 
 # --- trimming ---------------------------------------------------------------------------------------------------

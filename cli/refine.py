@@ -44,6 +44,7 @@ EXAMPLES = (
     options.crease_units,
     options.overveld,
     options.simplify,
+    options.fit_first,
     options.marks,
     options.sharp_angle,
     options.sharp_from,

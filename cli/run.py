@@ -70,6 +70,7 @@ class Request:
     bulge: float | None
     normals: str | None
     simplify: int | None
+    fit: str | None
     marks: str | None
     sharp_angle: float | None
     sharp_from: str | None
@@ -112,6 +113,13 @@ class Request:
         """The scheme's options that were given, but for the marks, which stand in a file."""
         given = {name: getattr(self, name) for name in SCHEME_OPTIONS}
         return {name: value for name, value in given.items() if not (value is None or value is False or value == ())}
+
+    @property
+    def fit_mode(self) -> str | None:
+        """What is fitted where IN is simplified: the fit is made for the surfaces of gregory."""
+        if self.simplify is None:
+            return None
+        return self.fit or ("full" if self.scheme == "gregory" else "none")
 
     @property
     def source(self) -> str:
@@ -173,6 +181,7 @@ class Run:
             **plain_options(self.options),
             "marks": request.marks,
             "simplify": request.simplify,
+            "fit": request.fit_mode,
             "precision": self.dtype.name,
             "trim": request.trim,
             "trim_map": request.trim and (request.trim_map or "face"),
@@ -220,12 +229,12 @@ def _simplified(request: Request, mesh: PolygonMesh, console: Console) -> tuple[
     They go through the text of an OBJ file, so that one command gives the bytes of two.
     """
     from curvify.formats import read_mesh, write_stream
-    from curvify.simplify import Options, simplify
+    from curvify.simplify import Fit, Options, simplify_and_fit
 
     given = {name: getattr(request, name) for name in ("weld", "split_rule") if getattr(request, name) is not None}
     options = Options(faces=request.simplify, **given)
     with files.naming(request.source, MeshError), console.progress(request.source) as progress:
-        result = simplify(mesh, options, progress.stage)
+        result = simplify_and_fit(mesh, options, Fit(request.fit_mode or "none"), progress.stage)
     text = io.BytesIO()
     write_stream(result.mesh, text, "obj")
     text.seek(0)
@@ -248,6 +257,8 @@ def check(request: Request) -> tuple[Any, str]:
     """The scheme's options and the format of OUT. Raises CurvifyError for what can be seen to fail beforehand."""
     options = scheme_options(request.scheme, request.scheme_options)
     check_trim(request)
+    if request.fit is not None and request.simplify is None:
+        raise OptionError("--fit is for what --simplify makes; give both, or use curvify fit")
     format = files.check_output(request.output, request.output_format, request.no_clobber)
     files.check_ascii(request.ascii, format)
     files.check_input(request.input, request.input_format)

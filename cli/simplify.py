@@ -10,12 +10,14 @@ from curvify.cli import options
 from curvify.cli.group import COMMANDS, Command
 
 if TYPE_CHECKING:
-    from curvify.simplify import Simplified
+    from curvify.mesh import PolygonMesh
+    from curvify.simplify.pipeline import Result
 
 EXAMPLES = (
     ("About 2000 polygons", "curvify simplify coarse.obj few.obj --faces 2000"),
     ("There and back", "curvify simplify coarse.obj few.ply --faces 500 && curvify refine few.ply smooth.ply"),
     ("How far the result is from the input", "curvify simplify coarse.obj few.obj --faces 500 --report few.json"),
+    ("Polygons with their vertices on IN", "curvify simplify coarse.obj few.obj --faces 500 --fit none"),
 )
 
 
@@ -24,6 +26,8 @@ EXAMPLES = (
 @options.with_options(
     options.faces,
     options.proxies,
+    options.fit,
+    options.max_error,
     options.compactness,
     options.dense_angle,
     options.weld,
@@ -39,9 +43,9 @@ EXAMPLES = (
 def command(**given: Any) -> None:
     """Turn a dense triangle mesh into few convex polygons that refine back to it.
 
-    The polygons are nearly planar, and their vertices lie on IN. Normals, creases and flat faces are taken
-    from IN and written along, so that 'curvify refine' needs no options to come back close to it. Closed meshes stay
-    closed, and the topology stays as it is. The same input gives the same bytes.
+    Normals, creases and flat faces are written along, so that 'curvify refine' needs no options. Normals and vertices
+    are fitted: the refined surface, not the polygons, comes as close to IN as it can. With '--fit none' the vertices
+    lie on IN. Closed meshes stay closed, and the topology stays as it is. The same input gives the same bytes.
     """
     simplify_file(**given)
 
@@ -51,6 +55,8 @@ def simplify_file(
     output: str,
     faces: int | None,
     proxies: int | None,
+    fit: str,
+    max_error: tuple[float, bool] | None,
     compactness: float,
     sharp_angle: float,
     weld: str | None,
@@ -64,7 +70,7 @@ def simplify_file(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    """Read, simplify, write, measure. Raises CurvifyError."""
+    """Read, simplify, fit, write, measure. Raises CurvifyError."""
     import numpy as np
 
     from curvify.cli import files
@@ -72,7 +78,7 @@ def simplify_file(
     from curvify.cli.run import timed
     from curvify.errors import FormatError, MeshError, OptionError
     from curvify.formats import write_mesh
-    from curvify.simplify import Options, simplify
+    from curvify.simplify import Fit, Options, simplify_and_fit
     from curvify.words import count_of
 
     console = Console(quiet, verbose)
@@ -90,9 +96,10 @@ def simplify_file(
     seconds: dict[str, float] = {}
     with timed(seconds, "read"):
         mesh = files.read_input(input, input_format)
+    wanted = Fit(fit, max_error=share_of_diagonal(max_error, mesh))
     name, target = files.shown_name(input, "stdin"), files.shown_name(output, "stdout")
     with timed(seconds, "simplify"), files.naming(name, MeshError), console.progress(name) as progress:
-        result = simplify(mesh, chosen, progress.stage)
+        result = simplify_and_fit(mesh, chosen, wanted, progress.stage)
     warnings = [f"{name}: {text}" for text in result.warnings]
     for text in warnings:
         console.warn(text)
@@ -107,11 +114,29 @@ def simplify_file(
     )
     console.explain(", ".join(f"{stage} {took:.3f} s" for stage, took in seconds.items()))
     if report is not None:
-        _write_report(report, result, {"input": input, "output": output, "options": vars(chosen)}, seconds, warnings)
+        every = vars(chosen) | {"fit": fit, "max_error": wanted.max_error}
+        about = {"input": input, "output": output, "options": every}
+        _write_report(report, result, about, seconds, warnings)
+
+
+def share_of_diagonal(length: tuple[float, bool] | None, mesh: PolygonMesh) -> float | None:
+    """A length of the command line as a share of the mesh's diagonal. Raises OptionError for 0."""
+    import numpy as np
+
+    from curvify.errors import OptionError
+
+    if length is None:
+        return None
+    number, is_share = length
+    if number == 0:
+        raise OptionError("no surface comes closer than 0; give a larger --max-error")
+    if is_share or not mesh.face_count:
+        return number
+    return number / max(float(np.linalg.norm(np.ptp(mesh.positions[mesh.face_vertices], axis=0))), 1e-300)
 
 
 def _write_report(
-    path: str, result: Simplified, about: dict[str, Any], seconds: dict[str, float], warnings: list[str]
+    path: str, result: Result, about: dict[str, Any], seconds: dict[str, float], warnings: list[str]
 ) -> None:
     """Measure what was made and write it down: distances in shares of the bounding box's diagonal."""
     from curvify import __version__
@@ -119,8 +144,11 @@ def _write_report(
     from curvify.cli.run import timed
     from curvify.simplify.accuracy import accuracy
 
+    simplified, fitted = result.simplified, result.fitted
     with timed(seconds, "measure"):
-        distances = accuracy(result.mesh, result.original)
+        found = {"distances": accuracy(result.mesh, simplified.original)}
+        if fitted.history:
+            found["distances_before_fit"] = accuracy(simplified.mesh, simplified.original)
     write_report(
         path,
         {
@@ -130,7 +158,8 @@ def _write_report(
             **about,
             "counts": result.counts,
             "timings": seconds,
-            "distances": {name: vars(found) for name, found in distances.items()},
+            **{key: {name: vars(part) for name, part in parts.items()} for key, parts in found.items()},
+            "fit": {"residuals": fitted.history, "max_error": fitted.largest} if fitted.history else None,
             "warnings": warnings,
         },
     )

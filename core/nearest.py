@@ -2,28 +2,52 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from curvify.arrays import cross
 from curvify.mesh import Floats, Ints
+from curvify.records import record
 
 #: The plastic number, whose powers spread points evenly over a square.
 PLASTIC = 1.32471795724474602596
+
+
+@record
+class Nearest:
+    """Nearest points on a triangle mesh, to be asked for often: the tree is built once."""
+
+    positions: Floats
+    sized: Ints
+    triangles: Ints
+    tree: Any
+
+    @classmethod
+    def of(cls, positions: Floats, triangles: Ints) -> Nearest:
+        """The tree of a mesh. Triangles ``(F,3)`` without area count for nothing; at least one must have some."""
+        import igl
+
+        sized = np.flatnonzero(double_areas(positions, triangles) > 0)
+        corners = np.ascontiguousarray(positions, dtype=np.float64)
+        kept = np.ascontiguousarray(triangles[sized], dtype=np.int64)
+        tree = igl.AABB()
+        tree.init(corners, kept)
+        return cls(corners, sized, kept, tree)
+
+    def __call__(self, points: Floats) -> tuple[Floats, Ints, Floats]:
+        """Distance ``(n,)`` of points ``(n,3)``, the nearest triangle ``(n,)`` and the place there ``(n,3)``."""
+        square, hit, place = self.tree.squared_distance(
+            self.positions, self.triangles, np.ascontiguousarray(points, dtype=np.float64)
+        )
+        return np.sqrt(square), self.sized[hit], place
 
 
 def nearest_points(points: Floats, positions: Floats, triangles: Ints) -> tuple[Floats, Ints, Floats]:
     """Distance ``(n,)`` of points ``(n,3)`` from a triangle mesh, the nearest triangle ``(n,)`` and the place there
     ``(n,3)``. Triangles ``(F,3)`` without area count for nothing; at least one must have some.
     """
-    import igl
-
-    sized = np.flatnonzero(double_areas(positions, triangles) > 0)
-    square, hit, place = igl.point_mesh_squared_distance(
-        np.ascontiguousarray(points, dtype=np.float64),
-        np.ascontiguousarray(positions, dtype=np.float64),
-        np.ascontiguousarray(triangles[sized], dtype=np.int64),
-    )[:3]
-    return np.sqrt(square), sized[hit], place
+    return Nearest.of(positions, triangles)(points)
 
 
 def spread(positions: Floats, triangles: Ints, count: int) -> tuple[Ints, Floats]:

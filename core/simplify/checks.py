@@ -6,10 +6,10 @@ import numpy as np
 
 from curvify.arrays import distinct
 from curvify.errors import MeshError
-from curvify.mesh import Ints
+from curvify.mesh import Ints, PolygonMesh
 from curvify.simplify.polygons import Polygons, pillows, shapes_of
 from curvify.simplify.triangles import Triangles
-from curvify.topology import Topology, fans
+from curvify.topology import Topology, build_topology, fans
 
 
 def check_polygons(dense: Triangles, polygons: Polygons) -> None:
@@ -56,3 +56,31 @@ def _is_triangle_of(dense: Triangles, polygons: Polygons, topology: Topology) ->
     single = count[polygons.regions] == 3
     whole = np.bincount(topology.faces, single & (polygons.sizes == 1), polygons.count)
     return (whole == 3) & (polygons.sides == 3)
+
+
+def check_mesh_like(start: PolygonMesh, mesh: PolygonMesh) -> None:
+    """Raise MeshError unless a mesh has the topology of the one that it was made from."""
+    problems = differences(start, mesh)
+    if problems:
+        raise MeshError(f"the fitted mesh is not valid ({'; '.join(problems)}); please report it, and use --fit none")
+
+
+def differences(start: PolygonMesh, mesh: PolygonMesh) -> list[str]:
+    """What makes a mesh another surface than the one that it was made from, in words."""
+    one, other = (build_topology(m.positions, m.face_offsets, m.face_vertices) for m in (start, mesh))
+    problems = []
+    tails, heads = other.vertices, other.vertices[other.next]
+    directed = np.sort(tails * np.int64(other.vertex_count) + heads)
+    if (directed[1:] == directed[:-1]).any() or other.nonmanifold.any():
+        problems.append("edges with more than two faces")
+    if (other.uses == 1).any() != (one.uses == 1).any():
+        problems.append("other boundaries")
+    if _euler(other) != _euler(one):
+        problems.append(f"Euler number {_euler(other)} for {_euler(one)}")
+    if len(distinct(fans(other))[0]) != len(distinct(other.vertices)[0]):
+        problems.append("vertices with several fans")
+    return problems
+
+
+def _euler(topology: Topology) -> int:
+    return len(distinct(topology.vertices)[0]) - len(topology.edges) + len(topology.offsets) - 1

@@ -1,0 +1,70 @@
+"""From a dense mesh to a coarse one that was fitted to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from curvify.mesh import PolygonMesh
+from curvify.simplify.chain import Simplified, simplify
+from curvify.simplify.checks import check_mesh_like
+from curvify.simplify.fit import Fit, Fitted, fit_mesh
+from curvify.simplify.attempts import Options, Progress
+from curvify.words import count_of
+
+#: The share of the faces asked for that simplifying makes; the others are for folds and large errors. The second one
+#: is for where a largest error is given.
+FIRST, FIRST_BOUNDED = 0.95, 0.8
+#: The share of all work that simplifying is.
+SIMPLIFYING = 0.25
+
+
+@dataclass(eq=False)
+class Result:
+    """A fitted ``mesh``; ``simplified``, what it was before; ``fitted``; ``counts`` and ``warnings`` of both."""
+
+    mesh: PolygonMesh
+    simplified: Simplified
+    fitted: Fitted
+    counts: dict[str, int]
+    warnings: list[str]
+
+
+def simplify_and_fit(mesh: PolygonMesh, options: Options, fit: Fit, progress: Progress | None = None) -> Result:
+    """Few polygons for a dense mesh, whose refinement comes back to it.
+
+    Without a fit they are what ``simplify`` makes. The budget of ``fit`` follows from ``options``. Raises MeshError
+    where there is nothing to simplify.
+    """
+    tell = progress or (lambda stage, share: None)
+    if fit.mode == "none":
+        result = simplify(mesh, options, progress)
+        return Result(result.mesh, result, Fitted(result.mesh, []), result.counts, result.warnings)
+    share = FIRST if fit.max_error is None else FIRST_BOUNDED
+    first = options if options.faces is None else replace(options, faces=max(round(share * options.faces), 1))
+    result = simplify(mesh, first, lambda stage, done: tell(stage, SIMPLIFYING * done))
+    budget = options.faces if options.faces is not None else round(result.mesh.face_count / share)
+    fitted = fit_mesh(
+        result.mesh,
+        result.original,
+        replace(fit, budget=max(budget, result.mesh.face_count)),
+        lambda stage, done: tell(stage, SIMPLIFYING + (1 - SIMPLIFYING) * done),
+    )
+    check_mesh_like(result.mesh, fitted.mesh)
+    counts = result.counts | {
+        "faces": fitted.mesh.face_count,
+        "vertices": fitted.mesh.vertex_count,
+        "crease_edges": len(fitted.mesh.marks.crease_edges),
+        "flat_faces": len(fitted.mesh.marks.flat_faces),
+    }
+    return Result(fitted.mesh, result, fitted, counts, [*result.warnings, *_notes(fit, fitted)])
+
+
+def _notes(fit: Fit, fitted: Fitted) -> list[str]:
+    """What there is to say of a largest error that could not be held."""
+    if fit.max_error is None or fitted.largest is None or fitted.largest <= fit.max_error:
+        return []
+    faces = count_of(fitted.mesh.face_count, "face")
+    return [
+        f"{faces} come within {100 * fitted.largest:.3g} % of the diagonal, not {100 * fit.max_error:.3g} %; "
+        "more faces may"
+    ]
