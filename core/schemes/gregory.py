@@ -80,19 +80,7 @@ def prepare(mesh: PolygonMesh | Coarse, options: Options | None = None) -> Patch
     """Patches for every face of the mesh. Raises MeshError where there is nothing to refine."""
     options = options or Options()
     coarse = prepare_mesh(mesh, options)
-
-    def tangents_of(work: Patchwork, corners: Ints) -> PaperTangent:
-        points, sides = patch_sides(work, corners)
-        patches = np.searchsorted(work.topology.offsets, corners[:, 0])
-        alpha = face_shapes(work, options).alpha[patches]
-        return paper_tangent(sides, points, side_normals(work, corners), options.cross_tangent, alpha)
-
-    inward = (
-        partial(blended_inward, partial(start_share, options.cross_tangent))
-        if blended(options)
-        else partial(paper_inward, tangents_of)
-    )
-    work = build_patchwork(coarse, options.tangent_lengths, options.split_rule, inward)
+    work = patchwork_of(coarse, options)
     work.construction = device_construction(work, options.cross_tangent, options.tangent_lengths)
     shape = face_shapes(work, options)
     used = {"precise": ("bulge",), "smooth": ("bulge",), "quadratic": ("alpha",)}.get(options.cross_tangent, ())
@@ -106,6 +94,23 @@ def prepare(mesh: PolygonMesh | Coarse, options: Options | None = None) -> Patch
             if len(rows):
                 classes.append(_patch_class(work, shape, patches[rows], corners[rows], group, options))
     return work.patches(classes, kite_sampling)
+
+
+def patchwork_of(coarse: Coarse, options: Options) -> Patchwork:
+    """The curves over a mesh, with its faces cut where patches would fold."""
+
+    def tangents_of(work: Patchwork, corners: Ints) -> PaperTangent:
+        points, sides = patch_sides(work, corners)
+        patches = np.searchsorted(work.topology.offsets, corners[:, 0])
+        alpha = face_shapes(work, options).alpha[patches]
+        return paper_tangent(sides, points, side_normals(work, corners), options.cross_tangent, alpha)
+
+    inward = (
+        partial(blended_inward, partial(start_share, options.cross_tangent))
+        if blended(options)
+        else partial(paper_inward, tangents_of)
+    )
+    return build_patchwork(coarse, options.tangent_lengths, options.split_rule, inward)
 
 
 def blended(options: Options) -> bool:

@@ -77,19 +77,21 @@ class Apart:
         are those of level 2: corners, the inner points of sides, inner points.
         """
         shape = self._shape(points, normals, others)
-        return _join(shape, exact_values(shape.controls, self._basis, 1)[0]), shape.sines
+        return _join(shape, exact_values(self._controls(shape), self._basis, 1)[0]), shape.sines
 
-    def with_normals(self, points: Floats, normals: Floats, others: Floats) -> tuple[Floats, Floats, Floats]:
-        """The samples, the unit normals there ``(f,6n+1,3)``, zero where derivatives are parallel, and the sines."""
+    def with_normals(self, points: Floats, normals: Floats, others: Floats) -> tuple[Floats, Floats, Floats, Bools]:
+        """The samples, the unit normals there ``(f,6n+1,3)``, zero where derivatives are parallel, the sines, and the
+        corners ``(f,n)`` that cannot keep their normals.
+        """
         shape = self._shape(points, normals, others)
-        values, by_xi, by_eta = exact_values(shape.controls, self._basis)
+        values, by_xi, by_eta = exact_values(self._controls(shape), self._basis)
         across = cross(by_xi, by_eta, axis=0)
         parallel = (across**2).sum(axis=0) <= PARALLEL * (by_xi**2).sum(axis=0) * (by_eta**2).sum(axis=0)
         inside = unit_rows(np.where(parallel, 0.0, across))
         along = unit_rows(_on_sides(shape.fields))
         corner = leading(shape.normals)
         found = np.concatenate([corner, along.reshape(*along.shape[:2], -1), inside], axis=2)
-        return _join(shape, values), np.moveaxis(found, 0, -1), shape.sines
+        return _join(shape, values), np.moveaxis(found, 0, -1), shape.sines, shape.adjusted
 
     @property
     def _basis(self) -> Basis:
@@ -119,25 +121,30 @@ class Apart:
             smooth_tangents,
         )
         out, back = tangents[:, 0], -tangents[np.roll(here, 1, axis=1).ravel(), 1]
-        upright = upright_normals(normals.reshape(-1, 3), out, back, self.stiff.ravel())[0]
+        upright, refit = upright_normals(normals.reshape(-1, 3), out, back, self.stiff.ravel())
         sines = np.einsum("ci,ci->c", cross(out, back), upright).reshape(count, n)
         curves = edge_curves(start, end, tangents[:, 0], tangents[:, 1], "circle")
         fields = normal_fields(curves, upright[edges[:, 0]], upright[edges[:, 1]], bending)
-        return self._filled(points, upright.reshape(count, n, 3), _per_side(curves, n), _per_side(fields, n), sines)
+        return Shape(
+            corner=leading(points),
+            normals=upright.reshape(count, n, 3),
+            curves=_per_side(curves, n),
+            fields=_per_side(fields, n),
+            sines=sines,
+            adjusted=refit.reshape(count, n) & ~self.stiff,
+        )
 
-    def _filled(self, points: Floats, normals: Floats, curves: Floats, fields: Floats, sines: Floats) -> Shape:
+    def _controls(self, shape: Shape) -> GregoryControls:
         """The patches between their sides."""
-        corner = leading(points)
-        sides: Sides = sides_of(corner, curves, fields)
+        sides: Sides = sides_of(shape.corner, shape.curves, shape.fields)
         tangent: CrossTangent
         target: Floats | None
         if self.kind == "precise":
-            target = center_point(corner, leading(normals), self.bulge)
+            target = center_point(shape.corner, leading(shape.normals), self.bulge)
             tangent = precise_tangent(sides, target)
         else:
             target, tangent = None, smooth_tangent(sides, self.bulge)
-        controls = GregoryControls.of(corner, tangent, target, self.uneven)
-        return Shape(controls, corner, normals, curves, fields, sines)
+        return GregoryControls.of(shape.corner, tangent, target, self.uneven)
 
 
 _PER_PATCH = tuple(name for name in Apart.__annotations__ if name not in ("kind", "uneven"))
@@ -145,16 +152,16 @@ _PER_PATCH = tuple(name for name in Apart.__annotations__ if name not in ("kind"
 
 @record
 class Shape:
-    """What a patch is made of: ``controls``, ``corner (3,f,n)`` points, ``normals (f,n,3)``, ``curves`` and ``fields
-    (3,f,n,4)`` of the sides, ``sines (f,n)``.
+    """What patches are made of: ``corner (3,f,n)`` points, ``normals (f,n,3)``, ``curves`` and ``fields (3,f,n,4)`` of
+    the sides; ``sines (f,n)`` of the corners, and those ``adjusted (f,n)`` that lost their normals.
     """
 
-    controls: GregoryControls
     corner: Floats
     normals: Floats
     curves: Floats
     fields: Floats
     sines: Floats
+    adjusted: Bools
 
 
 def _per_side(points: Floats, n: int) -> Floats:

@@ -9,14 +9,15 @@ are fitted on.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from curvify.errors import OptionError
 from curvify.mesh import PolygonMesh
-from curvify.pieces import split_mesh
-from curvify.schemes.gregory import Options
+from curvify.pieces import pieces_of, split_mesh
+from curvify.prepare import prepare_mesh
+from curvify.schemes.gregory import Options, patchwork_of
 from curvify.simplify.adapt import add_where_worst, face_errors
 from curvify.simplify.folds import unfold
 from curvify.simplify.model import build_model
@@ -75,7 +76,8 @@ def fit_mesh(mesh: PolygonMesh, dense: Triangles, fit: Fit, progress: Progress |
     """
     if fit.mode == "none":
         return Fitted(mesh, [])
-    return _Fitting(fit, dense, Target.of(dense), progress or (lambda stage, share: None)).run(mesh)
+    target = Target.for_patches(dense, mesh.face_count)
+    return _Fitting(fit, dense, target, progress or (lambda stage, share: None)).run(mesh)
 
 
 @dataclass(eq=False)
@@ -129,5 +131,7 @@ class _Fitting:
         self.tell(f"fit, {100 * residual:.4f} %", min(self.steps / (STEPS + LAST_STEPS), 1.0))
 
     def _whole(self, mesh: PolygonMesh) -> PolygonMesh:
-        """The mesh with convex polygons, cut where they fold."""
-        return unfold(split_mesh(mesh, self.fit.options.split_rule)[0]).mesh
+        """The mesh with convex polygons that do not fold, cut as the refiner would cut them: it will leave them."""
+        options = replace(self.fit.options, weld="never")
+        mesh = unfold(split_mesh(mesh, options.split_rule)[0]).mesh
+        return pieces_of(mesh, patchwork_of(prepare_mesh(mesh, options), options).split)

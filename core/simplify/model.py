@@ -67,11 +67,14 @@ class Group:
 
 @record
 class Samples:
-    """Samples of all patches: ``points``, unit ``normals (M,3)``; ``sines (C,)`` with which corners open."""
+    """Samples of all patches: ``points``, unit ``normals (M,3)``; ``sines (C,)`` with which corners open, and those
+    ``adjusted (C,)`` that cannot keep their normals.
+    """
 
     points: Floats
     normals: Floats
     sines: Floats
+    adjusted: Bools
 
 
 @record
@@ -110,6 +113,10 @@ class Model:
         a, b = self.topology.edges.T
         return np.linalg.norm(state.positions[b] - state.positions[a], axis=1)
 
+    def faces_with(self, corners: Bools) -> Bools:
+        """Pieces ``(F,)`` with any of the corners ``(C,)``."""
+        return np.bincount(self.topology.faces, corners) > 0
+
     def at(self, state: State) -> Model:
         """The model with the lines of a state, which follow from its positions."""
         lines = line_tangents(self.coarse.topology, state.positions, self.sharp, self.coarse.marks.straight)[0]
@@ -119,12 +126,12 @@ class Model:
     def samples(self, state: State) -> Samples:
         """Samples of all patches."""
         points, normals = np.empty((len(self.sample_faces), 3)), np.empty((len(self.sample_faces), 3))
-        sines = np.empty(len(self.topology.vertices))
+        sines, adjusted = np.empty(len(self.topology.vertices)), np.empty(len(self.topology.vertices), dtype=bool)
         for group in self.groups:
-            at, upright, opening = group.apart.with_normals(*group.arrays(state))
+            at, upright, opening, lost = group.apart.with_normals(*group.arrays(state))
             points[group.rows], normals[group.rows] = at.reshape(-1, 3), upright.reshape(-1, 3)
-            sines[group.apart.corners] = opening
-        return Samples(points, normals, sines)
+            sines[group.apart.corners], adjusted[group.apart.corners] = opening, lost
+        return Samples(points, normals, sines, adjusted)
 
     def mesh(self, state: State) -> PolygonMesh:
         """The coarse mesh with the positions and the normals of a state."""
@@ -188,6 +195,8 @@ def _free(coarse: Coarse, sectors: Ints, features: Features) -> tuple[Bools, Boo
     normals.
     """
     topology, marks = coarse.topology, coarse.marks
+    if coarse.given is None:  # the normals only repeat flat faces
+        return np.zeros(len(coarse.positions), dtype=bool), np.zeros(int(sectors.max()) + 1, dtype=bool)
     stiff = np.zeros(len(coarse.positions), dtype=bool)
     stiff[topology.edges[marks.straight]] = True
     flat = marks.flat[topology.faces]
@@ -195,7 +204,6 @@ def _free(coarse: Coarse, sectors: Ints, features: Features) -> tuple[Bools, Boo
     held[topology.vertices[flat]] = True
     used = np.zeros(len(held), dtype=bool)
     used[topology.vertices] = True
-    assert coarse.given is not None
     computed = np.abs(coarse.given - features.unfitted).max(axis=1) > 1e-9
     computed |= (features.corners | stiff)[topology.vertices] | flat
     return used & ~held, np.bincount(sectors, computed) == 0

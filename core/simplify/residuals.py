@@ -19,8 +19,9 @@ from curvify.records import record
 from curvify.simplify.model import Model, Samples
 from curvify.simplify.triangles import Triangles
 
-#: Samples of the dense mesh, and what all of them weigh against the samples of the patches.
-REVERSE_SAMPLES, REVERSE_WEIGHT = 20_000, 0.5
+#: Samples of the dense mesh for each patch, the least and the most in all; what all weigh against the patches' samples.
+REVERSE_SAMPLES, LEAST_SAMPLES, MOST_SAMPLES = 50, 2_000, 20_000
+REVERSE_WEIGHT = 0.5
 #: Sine with which corners should open, and the weight of what they lack.
 OPEN, BARRIER = float(np.sin(np.radians(8.0))), 0.3
 #: Closer than this share of the diagonal, the dense face's normal is the direction.
@@ -38,11 +39,16 @@ class Target:
     samples: Floats
 
     @classmethod
-    def of(cls, dense: Triangles, samples: int = REVERSE_SAMPLES) -> Target:
+    def of(cls, dense: Triangles, samples: int) -> Target:
         """The target with so many samples."""
         faces, weights = spread(dense.positions, dense.vertices, samples)
         places = places_on(dense.positions, dense.vertices[faces], weights)
         return cls(dense, Nearest.of(dense.positions, dense.vertices), places)
+
+    @classmethod
+    def for_patches(cls, dense: Triangles, count: int) -> Target:
+        """The target for so many patches."""
+        return cls.of(dense, min(max(REVERSE_SAMPLES * count, LEAST_SAMPLES), MOST_SAMPLES))
 
 
 @record

@@ -12,17 +12,18 @@ import numpy as np
 
 from curvify.mesh import Bools, Floats
 from curvify.records import record
+from curvify.simplify.folds import LEAST_SINE
 from curvify.simplify.linear import Linear, linearized
-from curvify.simplify.model import Model, State
-from curvify.simplify.residuals import Residuals, Target, Weights, residuals
+from curvify.simplify.model import Model, Samples, State
+from curvify.simplify.residuals import OPEN, Residuals, Target, Weights, residuals
 from curvify.simplify.slots import Unknowns
 
 #: Gain of the residual below which another step is not worth it.
 LEAST_GAIN = 0.01
 #: Damping at first, as a share of the median diagonal; its factors after a success and a failure; the least.
 DAMPING, EASED, RAISED, LEAST_DAMPING = 0.1, 0.5, 8.0, 0.01
-#: Tries of one step.
-TRIES = 4
+#: Tries of one step, and the factor on its parts that would break patches.
+TRIES, SHRUNK = 4, 0.3
 #: Largest tilt of a step in radians; largest move as a share of the mean edge and of the shortest edge at the vertex.
 LARGEST_TILT, LARGEST_MOVE = 0.35, 0.25
 
@@ -42,17 +43,19 @@ class Solution:
 
 @record
 class Here:
-    """A state with its residuals."""
+    """A state with its samples and residuals."""
 
     model: Model
     state: State
+    samples: Samples
     found: Residuals
 
     @classmethod
     def at(cls, model: Model, target: Target, weights: Weights, state: State) -> Here:
         """Residuals of a state."""
         there = model.at(state)
-        return cls(there, state, residuals(there, target, weights, there.samples(state)))
+        samples = there.samples(state)
+        return cls(there, state, samples, residuals(there, target, weights, samples))
 
 
 def solve(model: Model, target: Target, unknowns: Unknowns, steps: int, report: Report | None = None) -> Solution:
@@ -81,7 +84,7 @@ def _improved(here: Here, target: Target, weights: Weights, unknowns: Unknowns, 
     before = here.found.by_face(here.model)
     reach = _reach(here, unknowns)
     for _ in range(TRIES):
-        step = linear.step(damping * scale)
+        step = _kept_whole(here, linear.step(damping * scale), weights, unknowns, reach)
         there = Here.at(here.model, target, weights, _moved(here.state, step, unknowns, reach))
         worse = there.found.by_face(here.model) > before + before.mean()
         bad = _touched(here.model, unknowns, worse)
@@ -92,6 +95,24 @@ def _improved(here: Here, target: Target, weights: Weights, unknowns: Unknowns, 
         if not bad.any():
             damping *= RAISED
     return None
+
+
+def _kept_whole(here: Here, step: Floats, weights: Weights, unknowns: Unknowns, reach: Floats) -> Floats:
+    """The step without the unknowns at patches that it would break: fold at a corner, or take a normal from one."""
+    step = step.copy()
+    for _ in range(TRIES):
+        state = _moved(here.state, step, unknowns, reach)
+        samples = here.model.at(state).samples(state)
+        broken = _broken(samples, weights) & ~_broken(here.samples, weights)
+        if not broken.any():
+            break
+        step[_touched(here.model, unknowns, here.model.faces_with(broken))] *= SHRUNK
+    return step
+
+
+def _broken(samples: Samples, weights: Weights) -> Bools:
+    """Corners ``(C,)`` that fold, or cannot keep their normals."""
+    return samples.adjusted | (samples.sines < weights.least - OPEN - LEAST_SINE)
 
 
 def _scale(linear: Linear, unknowns: Unknowns) -> Floats:
