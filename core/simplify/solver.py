@@ -22,6 +22,8 @@ from curvify.simplify.slots import Unknowns
 LEAST_GAIN = 0.01
 #: Damping at first, as a share of the median diagonal; its factors after a success and a failure; the least.
 DAMPING, EASED, RAISED, LEAST_DAMPING = 0.1, 0.5, 8.0, 0.01
+#: A step that gains this share of what was predicted eases damping further, and has no least.
+AS_PREDICTED, FAR_EASED = 0.9, 0.1
 #: Tries of one step, and the factor on its parts that would break patches.
 TRIES, SHRUNK = 4, 0.3
 #: Largest tilt of a step in radians; largest move as a share of the mean edge and of the shortest edge at the vertex.
@@ -90,7 +92,11 @@ def _improved(here: Here, target: Target, weights: Weights, unknowns: Unknowns, 
         bad = _touched(here.model, unknowns, worse)
         damping[bad] *= RAISED
         if there.found.total < here.found.total:
-            damping[~bad] = np.maximum(EASED * damping[~bad], LEAST_DAMPING)
+            gain = here.found.total - there.found.total
+            if gain > AS_PREDICTED * linear.gain(step):
+                damping[~bad] *= FAR_EASED
+            else:
+                damping[~bad] = np.maximum(EASED * damping[~bad], LEAST_DAMPING)
             return there
         if not bad.any():
             damping *= RAISED
