@@ -29,8 +29,8 @@ from curvify.simplify.triangles import Triangles
 MODES = ("none", "normals", "full")
 #: Steps at first, and after polygons were cut.
 STEPS, LAST_STEPS = 8, 3
-#: The share of the polygons that err most, and how often polygons are added until a largest error holds.
-WORST, ROUNDS = 0.01, 5
+#: How often polygons are added until a largest error holds.
+ROUNDS = 5
 
 #: Told what is being done, and the share of the fit that is behind.
 Progress = Callable[[str, float], None]
@@ -96,8 +96,7 @@ class _Fitting:
             return Fitted(self._solved(mesh, STEPS), self.history)
         mesh = self._whole(self._solved(mesh, STEPS))
         if self.fit.max_error is None:
-            errors = face_errors(mesh, self.dense, self.fit.options)
-            mesh = self._added(mesh, errors, float(np.quantile(errors, 1 - WORST)))
+            mesh = self._added(mesh, face_errors(mesh, self.dense, self.fit.options), 0.0)
             return Fitted(self._whole(self._solved(mesh, LAST_STEPS)), self.history)
         return self._held(mesh, self.fit.max_error * self.dense.diagonal)
 

@@ -13,7 +13,7 @@ from curvify.words import count_of
 
 #: The share of the faces asked for that simplifying makes; the others are for folds and large errors. The second one
 #: is for where a largest error is given.
-FIRST, FIRST_BOUNDED = 0.95, 0.8
+FIRST, FIRST_BOUNDED = 0.88, 0.8
 #: The share of all work that simplifying is.
 SIMPLIFYING = 0.25
 
