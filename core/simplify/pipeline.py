@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from curvify.mesh import PolygonMesh
+from curvify.simplify.attempts import Options
 from curvify.simplify.chain import Simplified, simplify
 from curvify.simplify.checks import check_mesh_like
-from curvify.simplify.fit import Fit, Fitted, fit_mesh
-from curvify.simplify.attempts import Options, Progress
+from curvify.simplify.crossings import crossing_polygons
+from curvify.simplify.fit import Fit, Fitted, Progress, fit_mesh
 from curvify.words import count_of
 
 #: The share of the faces asked for that simplifying makes; the others are for folds and large errors. The second one
@@ -55,6 +56,7 @@ def simplify_and_fit(mesh: PolygonMesh, options: Options, fit: Fit, progress: Pr
         "vertices": fitted.mesh.vertex_count,
         "crease_edges": len(fitted.mesh.marks.crease_edges),
         "flat_faces": len(fitted.mesh.marks.flat_faces),
+        "crossings": len(crossing_polygons(fitted.mesh)),
     }
     return Result(fitted.mesh, result, fitted, counts, [*result.warnings, *_notes(fit, fitted)])
 
