@@ -23,9 +23,10 @@ import curvify
 from curvify.mesh import PolygonMesh
 from curvify.nearest import nearest_points, places_on, spread
 from curvify.normals import unit
-from curvify.simplify import Options, simplify
+from curvify.prepare import prepare_mesh
+from curvify.simplify import Fit, Options, simplify_and_fit
 from curvify.simplify.accuracy import Surface, flat_triangles, refined_triangles, two_way_distances
-from curvify.simplify.features import sectors_of
+from curvify.simplify.folds import folded_corners
 from curvify.simplify.polygons import shapes_of
 from curvify.simplify.triangles import Triangles, face_components, prepare_triangles
 from curvify.simplify.vsa import SWEEPS, Metric, cluster, exchange, region_errors
@@ -69,23 +70,36 @@ def measured(what: str, dense: Triangles, surface: Surface, faces: int, numbers:
     return Row(what, faces, numbers, seconds, found.rms, found.max, normal_deviation(dense, surface))
 
 
+def storage(mesh: PolygonMesh) -> int:
+    """Numbers that a coarse mesh needs."""
+    coarse = prepare_mesh(mesh)
+    sectors = len(np.unique(coarse.sectors))
+    return 3 * mesh.vertex_count + 2 * sectors + mesh.corner_count + mesh.face_count
+
+
 def of_curvify(mesh: PolygonMesh, faces: int, compactness: float) -> tuple[list[Row], int, str]:
-    """Flat and refined polygons, the numbers they need, and what they are like."""
-    start = time.process_time()
-    result = simplify(mesh, Options(faces=faces, compactness=compactness))
-    seconds = time.process_time() - start
-    coarse, polygons = result.mesh, result.polygons
-    sectors = int(sectors_of(polygons.topology(result.dense.positions), result.creases).max()) + 1
-    numbers = 3 * coarse.vertex_count + 2 * sectors + coarse.corner_count + coarse.face_count
-    rows = [
-        measured(what, result.original, surface, coarse.face_count, numbers, seconds)
-        for what, surface in (("flat", flat_triangles(coarse)), ("refined", refined_triangles(coarse)))
-    ]
-    shapes = shapes_of(result.dense.positions, polygons.vertices, polygons.sides)
+    """Polygons flat and refined, without and with a fit, the numbers that the fitted ones need, and what they are like.
+
+    Normals fitted, and normals and vertices.
+    """
+    rows, chosen = [], Options(faces=faces, compactness=compactness)
+    for mode, name in (("none", "refined"), ("normals", "normals fitted"), ("full", "fitted")):
+        start = time.process_time()
+        result = simplify_and_fit(mesh, chosen, Fit(mode))
+        seconds = time.process_time() - start
+        coarse, original = result.mesh, result.simplified.original
+        surfaces = [(name, refined_triangles(coarse))]
+        if mode == "none":
+            surfaces.insert(0, ("flat", flat_triangles(coarse)))
+        numbers = storage(coarse)
+        rows += [measured(what, original, surface, coarse.face_count, numbers, seconds) for what, surface in surfaces]
+    folds = folded_corners(coarse)
+    shapes = shapes_of(coarse.positions, coarse.face_vertices, coarse.face_sizes)
     thin = np.degrees(np.arcsin(np.clip(shapes.least_sines, 0, 1))) < 10
     about = (
         f"{coarse.face_sizes.mean():.2f} sides, {100 * (coarse.face_sizes > 3).mean():.0f} % with more than 3, "
-        f"{100 * thin.mean():.0f} % with an angle below 10 degrees, unevenness {np.median(shapes.unevenness):.3f}"
+        f"{100 * thin.mean():.0f} % with an angle below 10 degrees, unevenness {np.median(shapes.unevenness):.3f}, "
+        f"{100 * folds.polygons(folds.reversed).mean():.1f} % with a reversed corner"
     )
     return rows, numbers, about
 

@@ -433,7 +433,7 @@ def is_tilted(normals: Floats, out: Floats, back: Floats) -> Bools:
 
 
 def upright_normals(normals: Floats, out: Floats, back: Floats) -> Floats:
-    """Unit vectors ``(k,3)`` perpendicular to the tangents ``out`` and ``back (k,3)``, on the side of the ``normals``."""
+    """Unit vectors ``(k,3)`` perpendicular to the tangents ``out`` and ``back (k,3)``, on the side of ``normals``."""
     upright = cross(out, back)
     flattened = normals - dot(normals, out) * out
     along = np.linalg.norm(flattened, axis=1, keepdims=True) < 1e-6

@@ -121,7 +121,12 @@ class Apart:
             smooth_tangents,
         )
         out, back = tangents[:, 0], -tangents[np.roll(here, 1, axis=1).ravel(), 1]
-        upright, refit = upright_normals(normals.reshape(-1, 3), out, back, self.stiff.ravel())
+        upright, stiff = normals.reshape(-1, 3), self.stiff.ravel()
+        tilted = is_tilted(upright, out, back)
+        refit = np.flatnonzero(tilted | stiff)
+        if len(refit):
+            upright = upright.copy()
+            upright[refit] = upright_normals(upright[refit], out[refit], back[refit])
         sines = np.einsum("ci,ci->c", cross(out, back), upright).reshape(count, n)
         curves = edge_curves(start, end, tangents[:, 0], tangents[:, 1], "circle")
         fields = normal_fields(curves, upright[edges[:, 0]], upright[edges[:, 1]], bending)
@@ -131,7 +136,7 @@ class Apart:
             curves=_per_side(curves, n),
             fields=_per_side(fields, n),
             sines=sines,
-            adjusted=refit.reshape(count, n) & ~self.stiff,
+            adjusted=tilted.reshape(count, n) & ~self.stiff,
         )
 
     def _controls(self, shape: Shape) -> GregoryControls:

@@ -94,7 +94,7 @@ class _Fitting:
     def run(self, mesh: PolygonMesh) -> Fitted:
         if self.fit.budget is None:
             return Fitted(self._solved(mesh, STEPS), self.history)
-        mesh = self._whole(self._solved(mesh, STEPS))
+        mesh = self._as_refined(self._whole(self._solved(mesh, STEPS)))
         if self.fit.max_error is None:
             mesh = self._added(mesh, face_errors(mesh, self.dense, self.fit.options), 0.0)
             return Fitted(self._whole(self._solved(mesh, LAST_STEPS)), self.history)
@@ -130,7 +130,10 @@ class _Fitting:
         self.tell(f"fit, {100 * residual:.4f} %", min(self.steps / (STEPS + LAST_STEPS), 1.0))
 
     def _whole(self, mesh: PolygonMesh) -> PolygonMesh:
-        """The mesh with convex polygons that do not fold, cut as the refiner would cut them: it will leave them."""
+        """The mesh with convex polygons that do not fold, as far as cuts can help."""
+        return unfold(split_mesh(mesh, self.fit.options.split_rule)[0]).mesh
+
+    def _as_refined(self, mesh: PolygonMesh) -> PolygonMesh:
+        """The mesh with its polygons cut as the refiner cuts them, so that what is fitted is what will be refined."""
         options = replace(self.fit.options, weld="never")
-        mesh = unfold(split_mesh(mesh, options.split_rule)[0]).mesh
         return pieces_of(mesh, patchwork_of(prepare_mesh(mesh, options), options).split)

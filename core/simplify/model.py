@@ -12,8 +12,8 @@ from curvify.normals import perpendicular, unit
 from curvify.pieces import MAX_SIDES
 from curvify.prepare import Coarse, prepare_mesh
 from curvify.records import record, replaced
+from curvify.schemes.frames import piece_topology
 from curvify.schemes.gregory import Options, is_uneven
-from curvify.schemes.patchwork import piece_topology
 from curvify.sectors import Features, corner_points, line_tangents
 from curvify.simplify.apart import Apart, sample_triangles
 from curvify.topology import Topology

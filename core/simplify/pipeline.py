@@ -12,9 +12,9 @@ from curvify.simplify.crossings import crossing_polygons
 from curvify.simplify.fit import Fit, Fitted, Progress, fit_mesh
 from curvify.words import count_of
 
-#: The share of the faces asked for that simplifying makes; the others are for folds and large errors. The second one
-#: is for where a largest error is given.
-FIRST, FIRST_BOUNDED = 0.88, 0.8
+#: The share of the faces asked for, beyond the first few, that is kept for folds and large errors; the second one where
+#: a largest error is given.
+KEPT, KEPT_BOUNDED, FEW = 0.12, 0.2, 50
 #: The share of all work that simplifying is.
 SIMPLIFYING = 0.25
 
@@ -40,10 +40,12 @@ def simplify_and_fit(mesh: PolygonMesh, options: Options, fit: Fit, progress: Pr
     if fit.mode == "none":
         result = simplify(mesh, options, progress)
         return Result(result.mesh, result, Fitted(result.mesh, []), result.counts, result.warnings)
-    share = FIRST if fit.max_error is None else FIRST_BOUNDED
-    first = options if options.faces is None else replace(options, faces=max(round(share * options.faces), 1))
+    kept = KEPT if fit.max_error is None else KEPT_BOUNDED
+    first = options
+    if options.faces is not None:
+        first = replace(options, faces=options.faces - int(kept * max(options.faces - FEW, 0)))
     result = simplify(mesh, first, lambda stage, done: tell(stage, SIMPLIFYING * done))
-    budget = options.faces if options.faces is not None else round(result.mesh.face_count / share)
+    budget = options.faces if options.faces is not None else round(result.mesh.face_count / (1 - kept))
     fitted = fit_mesh(
         result.mesh,
         result.original,

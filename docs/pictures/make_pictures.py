@@ -9,11 +9,14 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import numpy as np
+
 import curvify
 from curvify.formats.marks_json import read_marks
 from curvify.gpu.device import Device, open_device
 from curvify.gpu.picture import picture, to_png
 from curvify.gpu.scene import Layer, Panel, Settings, Stroke
+from curvify.simplify import Fit, Options, simplify_and_fit
 
 HERE = Path(__file__).resolve().parent
 SAMPLES = HERE.parents[1] / "sample_meshes"
@@ -83,7 +86,27 @@ def features(device: Device) -> bytes:
     return to_png(picture(panels, Settings(size=(240, 240), background=None, fit="each"), device))
 
 
-PICTURES = {"refined.png": refined, "reflections.png": reflections, "rings.png": rings, "features.png": features}
+def fitted(device: Device) -> bytes:
+    """A dense mesh, polygons made from it, and their surfaces without and with a fit."""
+    fine = curvify.refine(sample("knob"), level=10, marks=read_marks(SAMPLES / "knob-hard.json"))
+    dense = curvify.PolygonMesh(fine.positions, 4 * np.arange(len(fine.faces) + 1), fine.faces.reshape(-1))
+    plain, best = (simplify_and_fit(dense, Options(faces=60), Fit(mode)).mesh for mode in ("none", "full"))
+    panels = [
+        Panel([Layer(dense, style="zebra")], f"{dense.face_count:,} quads"),
+        Panel([Layer(best, wire=EDGES)], f"{best.face_count} fitted polygons"),
+        Panel([Layer(curvify.refine(best, level=12), "zebra")], "and their surface"),
+        Panel([Layer(curvify.refine(plain, level=12), "zebra")], "without a fit"),
+    ]
+    return to_png(picture(panels, Settings(size=(300, 300), background=None, stripes=8, fit="each"), device))
+
+
+PICTURES = {
+    "refined.png": refined,
+    "reflections.png": reflections,
+    "rings.png": rings,
+    "features.png": features,
+    "fitted.png": fitted,
+}
 
 
 def main(folder: Path) -> None:
