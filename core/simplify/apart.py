@@ -29,7 +29,7 @@ from curvify.schemes.gregory import (
     smooth_tangent,
 )
 from curvify.schemes.gregory_basis import gregory_basis
-from curvify.sectors import EdgeEnds, end_tangents, upright_normals
+from curvify.sectors import EdgeEnds, end_tangents, is_tilted, upright_normals
 
 #: The level at which patches are sampled: 6 n + 1 points each.
 LEVEL = 2
