@@ -256,8 +256,14 @@ def _collapsed(mesh: PolygonMesh, topology: Topology, half_edges: Ints) -> Unfol
 
 def _renumbered(marks: Marks, vertices: Ints, faces: Ints) -> Marks:
     """Marks with new numbers ``vertices (V,)`` of vertices, and for the ``faces (P',)`` that are left."""
-    kinds = ("crease_edges", "straight_edges", "bent_edges", "curled_edges")
-    edges = {kind: vertices[getattr(marks, kind)] for kind in kinds}
+    kinds = {"crease_edges": "crease_sharpness", "straight_edges": None, "bent_edges": "edge_normals"}
+    edges = {}
+    for kind, values in {**kinds, "curled_edges": "kappas"}.items():
+        pairs = vertices[getattr(marks, kind)]
+        left = pairs[:, 0] != pairs[:, 1]  # of an edge that collapsed nothing is left
+        edges[kind] = pairs[left]
+        if values is not None:
+            edges[values] = getattr(marks, values)[left]
     return replaced(
         marks,
         corner_vertices=vertices[marks.corner_vertices],
