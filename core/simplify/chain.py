@@ -80,4 +80,3 @@ def _result(
         "flat_faces": len(coarse.marks.flat_faces),
     }
     return Simplified(coarse, original, dense, drawn.polygons, attempt.labels, drawn.creases, counts, warnings)
-
