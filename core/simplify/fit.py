@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from curvify.errors import OptionError
-from curvify.mesh import PolygonMesh
+from curvify.mesh import Floats, PolygonMesh
 from curvify.pieces import pieces_of, split_mesh
 from curvify.prepare import prepare_mesh
 from curvify.schemes.gregory import Options, patchwork_of
@@ -113,9 +113,14 @@ class _Fitting:
         largest, mesh = min(found, key=lambda pair: pair[0])
         return Fitted(mesh, self.history, largest / self.dense.diagonal)
 
-    def _added(self, mesh: PolygonMesh, errors: np.ndarray, limit: float) -> PolygonMesh:
+    def _added(self, mesh: PolygonMesh, errors: Floats, limit: float) -> PolygonMesh:
         room = (self.fit.budget or 0) - mesh.face_count
-        return add_where_worst(mesh, errors, limit, room, self.fit.options)
+        more = add_where_worst(mesh, errors, limit, room, self.fit.options)
+        if self.fit.mode == "normals" and more is not mesh:  # all vertices lie on the dense mesh
+            first = mesh.vertex_count
+            places = self.target.nearest(more.positions[first:])[2]
+            return more.with_(positions=np.concatenate([mesh.positions, places]))
+        return more
 
     def _solved(self, mesh: PolygonMesh, steps: int) -> PolygonMesh:
         """The mesh after some steps."""

@@ -12,6 +12,7 @@ import dense_meshes
 from curvify.errors import MeshError, OptionError
 from curvify.formats.marks_json import read_marks
 from curvify.mesh import PolygonMesh
+from curvify.nearest import Nearest
 from curvify.records import replaced
 from curvify.sampling import kite_sampling
 from curvify.schemes.gregory import Options as Refining
@@ -179,6 +180,13 @@ def test_normals_alone_leave_vertices_where_they_are(torus):
     assert not np.array_equal(fitted.corner_normals, torus.mesh.corner_normals)
     assert np.linalg.norm(fitted.corner_normals, axis=1) == pytest.approx(1)
     assert fit_mesh(torus.mesh, torus.original, Fit("none")).mesh is torus.mesh
+
+
+def test_vertices_added_lie_on_the_dense_mesh_where_only_normals_are_fitted(torus):
+    fitted = fit_mesh(torus.mesh, torus.original, Fit("normals", budget=torus.mesh.face_count + 12)).mesh
+    assert fitted.vertex_count > torus.mesh.vertex_count
+    distance = Nearest.of(torus.original.positions, torus.original.vertices)(fitted.positions)[0]
+    assert distance.max() < 1e-12
 
 
 def test_the_same_meshes_give_the_same_fit(torus):
