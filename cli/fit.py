@@ -45,9 +45,9 @@ EXAMPLES = (
     options.messages,
 )
 def command(**given: Any) -> None:
-    """Move the vertices and tilt the normals of a coarse mesh so that refining it comes close to a dense one.
+    """Fit a coarse mesh to a dense one, so that its surface comes back to it.
 
-    COARSE must lie near DENSE, as a retopology made on a scan does. OUT has the faces of COARSE, with normals; its
+    Vertices move and normals tilt until the refined surface is as close to DENSE as it can be. COARSE must lie near DENSE, as a retopology made on a scan does. OUT has the faces of COARSE, with normals; its
     creases, rims and flat faces stay what they are, flat faces with their vertices. What DENSE has beyond COARSE pulls
     at the rims of COARSE.
     """
