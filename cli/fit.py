@@ -47,9 +47,9 @@ EXAMPLES = (
 def command(**given: Any) -> None:
     """Fit a coarse mesh to a dense one, so that its surface comes back to it.
 
-    Vertices move and normals tilt until the refined surface is as close to DENSE as it can be. COARSE must lie near DENSE, as a retopology made on a scan does. OUT has the faces of COARSE, with normals; its
-    creases, rims and flat faces stay what they are, flat faces with their vertices. What DENSE has beyond COARSE pulls
-    at the rims of COARSE.
+    Vertices move and normals tilt until the refined surface is as close to DENSE as it can be. COARSE must lie near
+    DENSE, as a retopology made on a scan does. OUT has the faces of COARSE, with normals; its creases, rims and flat
+    faces stay what they are, flat faces with their vertices. What DENSE has beyond COARSE pulls at the rims of COARSE.
     """
     fit_files(**given)
 
