@@ -21,6 +21,7 @@ from curvify.schemes.gregory import Options, patchwork_of
 from curvify.simplify.adapt import add_where_worst, face_errors
 from curvify.simplify.folds import unfold
 from curvify.simplify.model import build_model
+from curvify.simplify.relax import relax_folded
 from curvify.simplify.residuals import Target
 from curvify.simplify.slots import Unknowns
 from curvify.simplify.solver import solve
@@ -135,8 +136,8 @@ class _Fitting:
         self.tell(f"fit, {100 * residual:.4f} %", min(self.steps / (STEPS + LAST_STEPS), 1.0))
 
     def _whole(self, mesh: PolygonMesh) -> PolygonMesh:
-        """The mesh with convex polygons that do not fold, as far as cuts can help."""
-        return unfold(split_mesh(mesh, self.fit.options.split_rule)[0]).mesh
+        """The mesh with convex polygons that do not fold, as far as that can be had."""
+        return relax_folded(unfold(split_mesh(mesh, self.fit.options.split_rule)[0]).mesh)
 
     def _as_refined(self, mesh: PolygonMesh) -> PolygonMesh:
         """The mesh with its polygons cut as the refiner cuts them, so that what is fitted is what will be refined."""

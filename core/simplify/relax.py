@@ -1,0 +1,103 @@
+"""The last resort at corners that fold where no cut helps: creases made straight, normals that lean less.
+
+Positions and polygons stay as they are. Both remedies are ours.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from curvify.arrays import distinct, take_rows
+from curvify.mesh import Floats, Ints, PolygonMesh
+from curvify.normals import degrees_between, sector_normals, unit
+from curvify.options import MeshOptions
+from curvify.prepare import Coarse, prepare_mesh
+from curvify.records import replaced
+from curvify.schemes.construction import distinct_normals
+from curvify.simplify.folds import ROUNDS, Folds, folded_corners
+from curvify.topology import Topology
+
+#: A crease that leaves its chord by more than this (degrees) at a corner that folds is made straight.
+OFF_CHORD = 10.0
+#: The shares of the way to the mean normal of their polygons by which normals are turned, one after the other.
+TURNS = (0.25, 0.5, 0.75, 1.0)
+
+
+def relax_folded(mesh: PolygonMesh) -> PolygonMesh:
+    """The mesh with fewer reversed corners, of which only marks and normals differ."""
+    return lean_less(straighten_folded(mesh))
+
+
+def straighten_folded(mesh: PolygonMesh) -> PolygonMesh:
+    """Mark the creases at reversed corners as straight where they leave their chords and straight ones help.
+
+    Between polygons that are nearly in one plane the direction across both normals, which a crease takes, is hardly
+    determined: a tenth of a degree in a normal can turn it by sixty.
+    """
+    tried = np.zeros(0, dtype=np.int64)
+    for _ in range(ROUNDS):
+        coarse, folds = prepare_mesh(mesh, MeshOptions(weld="never")), folded_corners(mesh)
+        edges = _creases_to_straighten(coarse, folds)
+        edges = edges[~np.isin(edges, tried)]
+        if not len(edges):
+            break
+        tried = np.concatenate([tried, edges])
+        before = _reversed_at(coarse.topology, folds)
+        after = _reversed_at(coarse.topology, folded_corners(_with_straight(mesh, coarse.topology.edges[edges])))
+        mesh = _with_straight(mesh, coarse.topology.edges[edges[after[edges] < before[edges]]])
+    return mesh
+
+
+def _with_straight(mesh: PolygonMesh, edges: Ints) -> PolygonMesh:
+    """The mesh with further straight edges."""
+    straight = np.concatenate([mesh.marks.straight_edges.reshape(-1, 2), edges])
+    return mesh.with_(marks=replaced(mesh.marks, straight_edges=straight))
+
+
+def _reversed_at(topology: Topology, folds: Folds) -> Ints:
+    """How many reversed corners lie between each edge ``(E,)`` and another."""
+    corners = np.flatnonzero(folds.reversed)
+    sides = topology.edge[np.concatenate([corners, topology.prev[corners]])]
+    return np.bincount(sides, minlength=len(topology.edges))
+
+
+def _creases_to_straighten(coarse: Coarse, folds: Folds) -> Ints:
+    """Creases at reversed corners that leave their chords."""
+    topology, features = coarse.topology, coarse.features()
+    edges = np.flatnonzero((_reversed_at(topology, folds) > 0) & features.sharp.any(axis=1))
+    start, end = (take_rows(coarse.positions, topology.edges[edges, i]) for i in (0, 1))
+    off = [degrees_between(features.tangents[edges, i], end - start) for i in (0, 1)]
+    return edges[np.maximum(*off) > OFF_CHORD]
+
+
+def lean_less(mesh: PolygonMesh) -> PolygonMesh:
+    """Turn the normals at reversed corners toward the mean of the polygons there, as little as helps."""
+    if mesh.corner_normals is None:
+        return mesh
+    coarse = prepare_mesh(mesh, MeshOptions(weld="never"))
+    normals, sector = distinct_normals(mesh.face_vertices, mesh.corner_normals)
+    mean = np.empty_like(normals)
+    mean[sector] = sector_normals(mesh.positions, mesh.face_offsets, mesh.face_vertices, coarse.area, sector)
+    folds, base = folded_corners(mesh), normals
+    for turn in TURNS:
+        pending = distinct(sector[folds.reversed])[0]
+        if not len(pending):
+            break
+        turned = normals.copy()
+        turned[pending] = unit((1 - turn) * base[pending] + turn * mean[pending])
+        trial = folded_corners(mesh.with_(corner_normals=turned[sector]))
+        helped = pending[_reversed_around(trial, sector)[pending] < _reversed_around(folds, sector)[pending]]
+        normals = normals.copy()
+        normals[helped] = turned[helped]
+        after = folded_corners(mesh.with_(corner_normals=normals[sector]))
+        if after.polygons(after.reversed).sum() < folds.polygons(folds.reversed).sum():
+            mesh, folds = mesh.with_(corner_normals=normals[sector]), after
+        else:
+            normals = distinct_normals(mesh.face_vertices, mesh.corner_normals)[0]
+    return mesh
+
+
+def _reversed_around(folds: Folds, sector: Ints) -> Floats:
+    """How many corners are reversed in the polygons around each sector ``(S,)``."""
+    count: Floats = np.bincount(folds.faces[folds.reversed], minlength=int(folds.faces[-1]) + 1)
+    return np.bincount(sector, count[folds.faces])
