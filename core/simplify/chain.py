@@ -10,7 +10,6 @@ from curvify.simplify.checks import check_polygons
 from curvify.simplify.crossings import crosses_itself, crossing_polygons
 from curvify.simplify.decimate import lightened
 from curvify.simplify.polygons import Polygons
-from curvify.simplify.relax import relax_folded
 from curvify.simplify.search import Progress, find_polygons
 from curvify.simplify.triangles import Triangles, prepare_triangles
 from curvify.simplify.vsa import Metric
@@ -71,7 +70,7 @@ def _result(
 ) -> Simplified:
     """The mesh as the input's file would hold it, and what there is to say about it."""
     drawn = attempt.drawn
-    coarse = relax_folded(drawn.mesh).with_(position_dtype=mesh.position_dtype)
+    coarse = drawn.mesh.with_(position_dtype=mesh.position_dtype)
     counts |= {
         "regions": int(attempt.labels.max()) + 1,
         "faces": coarse.face_count,

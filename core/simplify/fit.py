@@ -98,7 +98,7 @@ class _Fitting:
         mesh = self._as_refined(self._whole(self._solved(mesh, STEPS)))
         if self.fit.max_error is None:
             mesh = self._added(mesh, face_errors(mesh, self.dense, self.fit.options), 0.0)
-            return Fitted(self._whole(self._solved(mesh, LAST_STEPS)), self.history)
+            return Fitted(relax_folded(self._whole(self._solved(mesh, LAST_STEPS))), self.history)
         return self._held(mesh, self.fit.max_error * self.dense.diagonal)
 
     def _held(self, mesh: PolygonMesh, limit: float) -> Fitted:
@@ -110,7 +110,7 @@ class _Fitting:
             more = self._added(mesh, errors, limit)
             if errors.max() <= limit or more is mesh:
                 break
-            mesh = self._whole(self._solved(more, LAST_STEPS))
+            mesh = relax_folded(self._whole(self._solved(more, LAST_STEPS)))
         largest, mesh = min(found, key=lambda pair: pair[0])
         return Fitted(mesh, self.history, largest / self.dense.diagonal)
 
@@ -136,8 +136,8 @@ class _Fitting:
         self.tell(f"fit, {100 * residual:.4f} %", min(self.steps / (STEPS + LAST_STEPS), 1.0))
 
     def _whole(self, mesh: PolygonMesh) -> PolygonMesh:
-        """The mesh with convex polygons that do not fold, as far as that can be had."""
-        return relax_folded(unfold(split_mesh(mesh, self.fit.options.split_rule)[0]).mesh)
+        """The mesh with convex polygons that do not fold, as far as cuts can help."""
+        return unfold(split_mesh(mesh, self.fit.options.split_rule)[0]).mesh
 
     def _as_refined(self, mesh: PolygonMesh) -> PolygonMesh:
         """The mesh with its polygons cut as the refiner cuts them, so that what is fitted is what will be refined."""

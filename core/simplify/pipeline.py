@@ -15,6 +15,8 @@ from curvify.words import count_of
 #: The share of the faces asked for, beyond the first few, that is kept for folds and large errors; the second one where
 #: a largest error is given.
 KEPT, KEPT_BOUNDED, FEW = 0.12, 0.2, 50
+#: The share by which cuts may exceed the number of faces asked for, and how often fewer are tried where they do.
+WITHIN, TRIES = 0.05, 3
 #: The share of all work that simplifying is.
 SIMPLIFYING = 0.25
 
@@ -40,18 +42,15 @@ def simplify_and_fit(mesh: PolygonMesh, options: Options, fit: Fit, progress: Pr
     if fit.mode == "none":
         result = simplify(mesh, options, progress)
         return Result(result.mesh, result, Fitted(result.mesh, []), result.counts, result.warnings)
-    kept = KEPT if fit.max_error is None else KEPT_BOUNDED
-    first = options
-    if options.faces is not None:
-        first = replace(options, faces=options.faces - int(kept * max(options.faces - FEW, 0)))
-    result = simplify(mesh, first, lambda stage, done: tell(stage, SIMPLIFYING * done))
-    budget = options.faces if options.faces is not None else round(result.mesh.face_count / (1 - kept))
-    fitted = fit_mesh(
-        result.mesh,
-        result.original,
-        replace(fit, budget=max(budget, result.mesh.face_count)),
-        lambda stage, done: tell(stage, SIMPLIFYING + (1 - SIMPLIFYING) * done),
-    )
+    first = replace(options, faces=_first_faces(options.faces, fit)) if options.faces is not None else options
+    for _ in range(TRIES):
+        result, fitted = _simplified_and_fitted(mesh, first, options.faces, fit, tell)
+        faces = fitted.mesh.face_count
+        if first.faces is None or options.faces is None or result.mesh.face_count > options.faces:
+            break  # not asked for, or not to be had
+        if faces <= (1 + WITHIN) * options.faces:
+            break
+        first = replace(first, faces=max(int(first.faces * (1 + WITHIN / 2) * options.faces / faces), 1))
     check_mesh_like(result.mesh, fitted.mesh)
     counts = result.counts | {
         "faces": fitted.mesh.face_count,
@@ -61,6 +60,30 @@ def simplify_and_fit(mesh: PolygonMesh, options: Options, fit: Fit, progress: Pr
         "crossings": len(crossing_polygons(fitted.mesh)),
     }
     return Result(fitted.mesh, result, fitted, counts, [*result.warnings, *_notes(fit, fitted)])
+
+
+def _first_faces(faces: int, fit: Fit) -> int:
+    """How many polygons to begin with for so many in the end."""
+    return faces - int(_kept(fit) * max(faces - FEW, 0))
+
+
+def _kept(fit: Fit) -> float:
+    return KEPT if fit.max_error is None else KEPT_BOUNDED
+
+
+def _simplified_and_fitted(
+    mesh: PolygonMesh, options: Options, faces: int | None, fit: Fit, tell: Progress
+) -> tuple[Simplified, Fitted]:
+    """The polygons that ``options`` ask for, and what the fit makes of them with ``faces`` to spend."""
+    result = simplify(mesh, options, lambda stage, done: tell(stage, SIMPLIFYING * done))
+    budget = faces if faces is not None else round(result.mesh.face_count / (1 - _kept(fit)))
+    fitted = fit_mesh(
+        result.mesh,
+        result.original,
+        replace(fit, budget=max(budget, result.mesh.face_count)),
+        lambda stage, done: tell(stage, SIMPLIFYING + (1 - SIMPLIFYING) * done),
+    )
+    return result, fitted
 
 
 def _notes(fit: Fit, fitted: Fitted) -> list[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from curvify.arrays import distinct, take_rows
-from curvify.mesh import Floats, Ints, PolygonMesh
+from curvify.mesh import Ints, PolygonMesh
 from curvify.normals import degrees_between, sector_normals, unit
 from curvify.options import MeshOptions
 from curvify.prepare import Coarse, prepare_mesh
@@ -17,10 +17,10 @@ from curvify.schemes.construction import distinct_normals
 from curvify.simplify.folds import ROUNDS, Folds, folded_corners
 from curvify.topology import Topology
 
-#: A crease that leaves its chord by more than this (degrees) at a corner that folds is made straight.
+#: A crease of a flat polygon that leaves its chord by more than this (degrees) at a corner that folds is made straight.
 OFF_CHORD = 10.0
 #: The shares of the way to the mean normal of their polygons by which normals are turned, one after the other.
-TURNS = (0.25, 0.5, 0.75, 1.0)
+TURNS = (0.25, 0.5)
 
 
 def relax_folded(mesh: PolygonMesh) -> PolygonMesh:
@@ -29,7 +29,7 @@ def relax_folded(mesh: PolygonMesh) -> PolygonMesh:
 
 
 def straighten_folded(mesh: PolygonMesh) -> PolygonMesh:
-    """Mark the creases at reversed corners as straight where they leave their chords and straight ones help.
+    """Mark creases of flat polygons as straight that leave their chords at reversed corners, where that helps.
 
     Between polygons that are nearly in one plane the direction across both normals, which a crease takes, is hardly
     determined: a tenth of a degree in a normal can turn it by sixty.
@@ -37,7 +37,7 @@ def straighten_folded(mesh: PolygonMesh) -> PolygonMesh:
     tried = np.zeros(0, dtype=np.int64)
     for _ in range(ROUNDS):
         coarse, folds = prepare_mesh(mesh, MeshOptions(weld="never")), folded_corners(mesh)
-        edges = _creases_to_straighten(coarse, folds)
+        edges = _creases_to_straighten(mesh, coarse, folds)
         edges = edges[~np.isin(edges, tried)]
         if not len(edges):
             break
@@ -61,10 +61,12 @@ def _reversed_at(topology: Topology, folds: Folds) -> Ints:
     return np.bincount(sides, minlength=len(topology.edges))
 
 
-def _creases_to_straighten(coarse: Coarse, folds: Folds) -> Ints:
-    """Creases at reversed corners that leave their chords."""
+def _creases_to_straighten(mesh: PolygonMesh, coarse: Coarse, folds: Folds) -> Ints:
+    """Creases of flat polygons, at reversed corners, that leave their chords."""
     topology, features = coarse.topology, coarse.features()
     edges = np.flatnonzero((_reversed_at(topology, folds) > 0) & features.sharp.any(axis=1))
+    level = np.isin(topology.faces, mesh.marks.flat_faces)
+    edges = edges[level[topology.first[edges]] | level[topology.last[edges]]]
     start, end = (take_rows(coarse.positions, topology.edges[edges, i]) for i in (0, 1))
     off = [degrees_between(features.tangents[edges, i], end - start) for i in (0, 1)]
     return edges[np.maximum(*off) > OFF_CHORD]
@@ -78,26 +80,26 @@ def lean_less(mesh: PolygonMesh) -> PolygonMesh:
     normals, sector = distinct_normals(mesh.face_vertices, mesh.corner_normals)
     mean = np.empty_like(normals)
     mean[sector] = sector_normals(mesh.positions, mesh.face_offsets, mesh.face_vertices, coarse.area, sector)
-    folds, base = folded_corners(mesh), normals
+    folds, given = folded_corners(mesh), normals
     for turn in TURNS:
         pending = distinct(sector[folds.reversed])[0]
         if not len(pending):
             break
-        turned = normals.copy()
-        turned[pending] = unit((1 - turn) * base[pending] + turn * mean[pending])
-        trial = folded_corners(mesh.with_(corner_normals=turned[sector]))
-        helped = pending[_reversed_around(trial, sector)[pending] < _reversed_around(folds, sector)[pending]]
-        normals = normals.copy()
-        normals[helped] = turned[helped]
-        after = folded_corners(mesh.with_(corner_normals=normals[sector]))
-        if after.polygons(after.reversed).sum() < folds.polygons(folds.reversed).sum():
-            mesh, folds = mesh.with_(corner_normals=normals[sector]), after
-        else:
-            normals = distinct_normals(mesh.face_vertices, mesh.corner_normals)[0]
+        trial = normals.copy()
+        trial[pending] = unit((1 - turn) * given[pending] + turn * mean[pending])
+        after = _reversed_around(folded_corners(mesh.with_(corner_normals=trial[sector])), sector)
+        unhelped = pending[after[pending] >= _reversed_around(folds, sector)[pending]]
+        trial[unhelped] = normals[unhelped]
+        turned = mesh.with_(corner_normals=trial[sector])
+        found = folded_corners(turned)
+        if found.polygons(found.reversed).sum() < folds.polygons(folds.reversed).sum():
+            mesh, folds, normals = turned, found, trial
     return mesh
 
 
-def _reversed_around(folds: Folds, sector: Ints) -> Floats:
+def _reversed_around(folds: Folds, sector: Ints) -> Ints:
     """How many corners are reversed in the polygons around each sector ``(S,)``."""
-    count: Floats = np.bincount(folds.faces[folds.reversed], minlength=int(folds.faces[-1]) + 1)
-    return np.bincount(sector, count[folds.faces])
+    by_face = np.bincount(folds.faces[folds.reversed], minlength=int(folds.faces[-1]) + 1)
+    around = np.zeros(int(sector.max()) + 1, dtype=np.int64)
+    np.add.at(around, sector, by_face[folds.faces])
+    return around
