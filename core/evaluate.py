@@ -17,17 +17,14 @@ import numpy as np
 
 from curvify import tables
 from curvify.arrays import as_slice, cross, unit_rows, values_of
-from curvify.mesh import Bools, Floats, Ints
+from curvify.mesh import Floats, Ints
 from curvify.normals import unit
 from curvify.sampling import Sampling, kite_coordinates
 from curvify.schemes.base import Basis, Controls, Form, KiteForms, LinearControls, PatchClass, Patches
 from curvify.schemes.domain import domain_jets
-from curvify.tables import TAIL, Tables, chebyshev_points
+from curvify.series import sampled
+from curvify.tables import Tables
 
-#: How much to make of the estimate of what a series leaves out.
-SAFETY = 10.0
-#: Coefficients below this share of the longest vector are rounding noise.
-NOISE = 2e-15
 #: From this many sides the fields are evaluated at every sample: the tables would be too large.
 MANY_SIDES = 17
 #: Squared sine below which two derivatives count as parallel.
@@ -52,24 +49,6 @@ def _work(name: str, shape: tuple[int, ...]) -> Floats:
 def chunk_size(samples: int) -> int:
     """Patches evaluated at once: 10 to 20 thousand samples, which fit the cache with their work arrays."""
     return 16 * int(np.clip(round(1000 / max(samples, 1)), 1, 16))
-
-
-def enough_points(fields: Floats, tolerance: float) -> Bools:
-    """Which patches ``(f,)`` have ``fields (3,f,n,m)`` at enough Chebyshev points.
-
-    The coefficients of an analytic function fall like a geometric series: the last four give its rate, which gives
-    the sum of those left out. Enough when that is below ``tolerance`` times the longest of a patch's vectors, or
-    when the last four are rounding noise. The vectors at both ends and in the middle stand for all.
-    """
-    rows = fields.transpose(3, 0, 2, 1)  # the order in memory
-    last = tables.tail_matrix(len(rows)).T @ rows.reshape(len(rows), -1)
-    last = np.abs(last, out=last).reshape(TAIL, *rows.shape[1:]).max(axis=1)
-    earlier, later = np.maximum(last[0], last[1]), np.maximum(last[2], last[3])
-    rate = np.sqrt(np.divide(later, earlier, out=np.ones_like(later), where=earlier > later))
-    left_out = SAFETY * later * rate / np.maximum(1 - rate, 1 / SAFETY)
-    size = np.abs(rows[[0, len(rows) // 2, -1]]).max(axis=(0, 1, 2))
-    noise = np.maximum(earlier, later).max(axis=0) <= NOISE * size
-    return noise | (left_out.max(axis=0) <= tolerance * size)
 
 
 def fill_patches(
@@ -174,31 +153,28 @@ def _evaluate_form(
     form: Form, rows: Ints, points: Floats, grid: tuple[int, int], tolerance: float, orders: int
 ) -> Iterator[tuple[tuple[Ints, slice], Floats]]:
     """Values ``(o,3,f,S)`` of a form, with the index of the patches and samples they belong to."""
-    left = np.arange(len(rows))
     controls = form.controls(rows)
-    if isinstance(controls, LinearControls):  # one table serves all
-        nodes = controls.fields(chebyshev_points(tables.NODE_COUNTS[0]))
-        key = (grid, tables.NODE_COUNTS[0], orders)
-        yield from _by_tables(form, controls.linear, nodes, left, points, key)
-        return
-    exact = grid[0] >= MANY_SIDES or len(points) <= FEW_SAMPLES
-    for count in () if exact else tables.NODE_COUNTS:
-        nodes = controls.fields(chebyshev_points(count))
-        enough = enough_points(nodes, tolerance)
-        part = np.flatnonzero(enough)
-        for place, values in _by_tables(form, controls.linear, nodes, part, points, (grid, count, orders)):
-            yield (left[place[0]], place[1]), values
-        if enough.all():
-            return
-        rest = np.flatnonzero(~enough)
-        left, controls = left[rest], controls.take(rest)
+    left = np.ones(len(rows), dtype=bool)
+    if isinstance(controls, LinearControls) or not (grid[0] >= MANY_SIDES or len(points) <= FEW_SAMPLES):
+        for some, group, fields, part in sampled(controls, len(rows), tolerance):
+            key = (grid, fields.shape[3], orders)
+            for (chunk, samples), values in _by_tables(form, group.linear, fields, part, points, key):
+                yield (some[chunk], samples), values
+            left[some[part]] = False
+    yield from _pointwise(form, controls, np.flatnonzero(left), points, grid, orders)
+
+
+def _pointwise(
+    form: Form, controls: Controls, left: Ints, points: Floats, grid: tuple[int, int], orders: int
+) -> Iterator[tuple[tuple[Ints, slice], Floats]]:
+    """Values of the patches ``left``, their fields evaluated at every sample."""
     size = chunk_size(min(len(points), tables.SAMPLES))
     for begin in range(0, len(left), size):
-        part = np.arange(begin, min(begin + size, len(left)))
+        part = left[begin : begin + size]
         few = controls.take(part)
         for block in tables.blocks(form, points, grid, 0, orders):
             assert block.basis is not None
-            yield (left[part], slice(block.first, block.last)), exact_values(few, block.basis, orders)
+            yield (part, slice(block.first, block.last)), exact_values(few, block.basis, orders)
 
 
 def _by_tables(
@@ -206,8 +182,6 @@ def _by_tables(
 ) -> Iterator[tuple[tuple[Ints, slice], Floats]]:
     """Values of the patches ``part`` among those with the given controls, chunk by chunk."""
     grid, count, orders = key
-    if not len(part):
-        return
     size = chunk_size(min(len(points), tables.SAMPLES))
     for block in tables.blocks(form, points, grid, count, orders):
         for begin in range(0, len(part), size):

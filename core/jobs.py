@@ -214,7 +214,7 @@ class _Evaluation:
         )
         corners = self.patches.topology.offsets[patch_class.patches[rows]][:, None] + np.arange(patch_class.sides)
         for name, values in self._carried():
-            assign(target[name], np.einsum("sn,fnc->fsc", sampling.blend, values[corners]))
+            assign(target[name], sampling.blend @ values[corners])
         if not together:
             records[(places[:, None] + np.arange(samples)).reshape(-1)] = target.reshape(-1)
 

@@ -16,29 +16,10 @@ import numpy as np
 from curvify.mesh import Floats
 from curvify.records import record
 from curvify.schemes.base import Basis, Form
+from curvify.series import chebyshev_points
 
-#: Numbers of Chebyshev points tried, fewest first.
-NODE_COUNTS = (12, 16, 24, 32, 48)
-#: Chebyshev coefficients at the end of a series from which the rest is estimated.
-TAIL = 4
 #: Samples of a patch evaluated with one table, so that the table stays in cache.
 SAMPLES = 2048
-
-
-def chebyshev_points(count: int) -> Floats:
-    """Chebyshev-Lobatto points ``(m,)`` of [0, 1], ascending, ends included."""
-    return np.sin(0.5 * np.pi * np.arange(count) / (count - 1)) ** 2
-
-
-@lru_cache(maxsize=8)
-def tail_matrix(count: int) -> Floats:
-    """Values at the Chebyshev points to the last coefficients of their series ``(m, TAIL)``."""
-    j = np.arange(count)
-    order = j[-TAIL:]
-    matrix = np.cos(np.pi * np.outer(count - 1 - j, order) / (count - 1)) * 2 / (count - 1)
-    matrix[[0, -1]] /= 2
-    matrix[:, order == count - 1] /= 2
-    return matrix
 
 
 def lagrange(count: int, t: Floats) -> tuple[Floats, Floats]:
@@ -55,7 +36,7 @@ def lagrange(count: int, t: Floats) -> tuple[Floats, Floats]:
     return values, values @ _differentiation(count)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def _differentiation(count: int) -> Floats:
     """Matrix ``(m,m)``: row i holds the derivatives at node i of the Lagrange polynomials."""
     nodes = chebyshev_points(count)

@@ -29,9 +29,8 @@ from curvify.sampling import Sampling
 from curvify.schemes.base import Basis, BezierEdges, Edges, Form, KiteForms, PatchClass, Patches, bernstein_basis
 from curvify.schemes.blend_network import BlendEdges
 from curvify.schemes.construction import EDGE_TEXELS, Construction, DeviceForm
+from curvify.series import sampled
 
-#: Numbers of Chebyshev points tried, fewest first.
-NODE_COUNTS = (8, 12, 16, 24, 32, 48)
 #: What may be left out of the series of a side field, over its length: as much as single precision rounds away.
 SERIES_TOLERANCE = 1e-7
 
@@ -230,12 +229,9 @@ class GpuBackend:
         """Write patches whose control vectors are built here; which of them ``(f,)`` have fields that no number of
         Chebyshev points describes.
         """
-        left = np.arange(len(rows))
-        controls = form.controls(rows)
-        for count in NODE_COUNTS:
-            nodes = controls.fields(tables.chebyshev_points(count))
-            enough = _enough_points(nodes)
-            chosen = np.flatnonzero(enough)
+        left = np.ones(len(rows), dtype=bool)
+        for some, controls, nodes, chosen in sampled(form.controls(rows), len(rows), SERIES_TOLERANCE):
+            count = nodes.shape[3]
             blocks = [
                 Table(
                     (form.key, grid, count, kind.orders, block.first),
@@ -243,19 +239,16 @@ class GpuBackend:
                     partial(_pack_block, block, kind.orders),
                 )
                 for block in tables.blocks(form, points, grid, count, kind.orders)
-            ] if len(chosen) else []
-            columns = controls.linear.shape[2] + nodes.shape[2] * nodes.shape[3]
+            ]
+            columns = controls.linear.shape[2] + nodes.shape[2] * count
             step = self.products.most_patches(len(points), columns)
             for begin in range(0, len(chosen), step):
                 part = chosen[begin : begin + step]
                 linear, origin = _relative(controls.linear[:, part], form.points)
                 fields = nodes[:, part].reshape(3, len(part), -1)
-                self._evaluate(self._sent(linear, fields), kind, blocks, origin, left[part], target)
-            left = left[~enough]
-            if not len(left):
-                break
-            controls = controls.take(np.flatnonzero(~enough))
-        return np.isin(np.arange(len(rows)), left)
+                self._evaluate(self._sent(linear, fields), kind, blocks, origin, some[part], target)
+            left[some[chosen]] = False
+        return left
 
     def _evaluate(
         self,
@@ -325,13 +318,6 @@ def _relative(linear: Floats, points: int) -> tuple[Floats, Floats]:
         return linear, np.zeros((linear.shape[1], 3))
     origin = linear[..., 0].astype(np.float32).astype(np.float64)
     return np.concatenate([linear[..., :points] - origin[..., None], linear[..., points:]], axis=2), origin.T
-
-
-def _enough_points(nodes: Floats) -> Bools:
-    """Which patches ``(f,)`` have fields ``(3,f,n,m)`` at enough points; all of them where there are no fields."""
-    if not nodes.shape[2]:
-        return np.ones(nodes.shape[1], dtype=bool)
-    return evaluate.enough_points(nodes, SERIES_TOLERANCE)
 
 
 def _pack_basis(device: DeviceForm, basis: Basis, orders: int) -> Singles:

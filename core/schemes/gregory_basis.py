@@ -24,8 +24,62 @@ from curvify.schemes.domain import Domain, domain_jets, jet_compose, jet_product
 def gregory_basis(sides: int, points: Floats, corrected: bool, uneven: bool = False) -> Basis:
     """Tables of the patch at ``points (S,2)``, with the polynomial correction and the center if ``corrected``.
 
-    ``uneven`` polygons get a correction of the first degree.
+    ``uneven`` polygons get a correction of the first degree. With a correction, which is most of the work, points that
+    are n turns of the first of them, as those of a sampling are, take the work of those only.
     """
+    size = _points_turned(sides, points) if corrected and sides != 4 else 0
+    if not size:
+        return _basis_at(sides, points, corrected, uneven)
+    chosen = np.concatenate([points[:size], points[sides * size :]])
+    return _turned(_basis_at(sides, chosen, corrected, uneven), sides, size)
+
+
+def _points_turned(sides: int, points: Floats) -> int:
+    """Of how many first points ``points (S,2)`` are n turns, apart from the center at their end; 0 if they are not."""
+    size = len(points) // sides
+    turns = points[: sides * size].reshape(sides, size, 2)
+    same = np.allclose(turns, turns[0] @ np.swapaxes(_rotations(sides), 1, 2), rtol=0, atol=1e-12)
+    return size if same and not points[sides * size :].any() else 0
+
+
+def _rotations(sides: int) -> Floats:
+    """The turns ``(n,2,2)`` of the domain onto itself, the first by nothing."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.stack([cosine, -sine, sine, cosine], axis=-1).reshape(sides, 2, 2)
+
+
+def _turned(first: Basis, sides: int, size: int) -> Basis:
+    """The tables at all turns of the first ``size`` points of ``first``, and then at its others.
+
+    At a point turned by one corner, side k counts as much as side k - 1 at the point itself, and gradients are turned.
+    """
+    count = sides * size + first.linear.shape[1] - size
+    rotations = _rotations(sides)
+
+    def turn(jets: Floats) -> Floats:
+        """Jets ``(3,size+r,b,n,...)``, the same for each of b kinds of columns, at all points."""
+        result = np.empty((3, count, *jets.shape[2:]))
+        result[:, sides * size :] = jets[:, size:]
+        for j, rotation in enumerate(rotations):
+            rolled = np.roll(jets[:, :size], j, axis=3)
+            part = result[:, j * size : (j + 1) * size]
+            part[0] = rolled[0]
+            part[1:] = np.tensordot(rotation, rolled[1:], 1)
+        return result
+
+    kinds = first.linear.shape[2] // sides
+    linear = np.empty((3, count, first.linear.shape[2]))
+    blocks = turn(first.linear[..., : kinds * sides].reshape(3, -1, kinds, sides))
+    linear[..., : kinds * sides] = blocks.reshape(3, count, -1)
+    single = first.linear[..., kinds * sides :]  # of the center: the same for all sides
+    linear[..., kinds * sides :] = turn(single[..., None])[..., 0]
+    weights, abscissae = (turn(jets[:, :, None])[:, :, 0] for jets in (first.weights, first.abscissae))
+    return Basis(linear, weights, abscissae, turn(first.ends[:, :, None])[:, :, 0])
+
+
+def _basis_at(sides: int, points: Floats, corrected: bool, uneven: bool) -> Basis:
+    """Tables of the patch at any ``points (S,2)``; see ``gregory_basis``."""
     domain = domain_jets(sides, points)
     blocks = _plain_columns(domain)
     weights = _field_weights(domain)
@@ -138,20 +192,21 @@ def _monomials(degree: int) -> Ints:
     return np.array([(i, total - i) for total in range(degree + 1) for i in range(total, -1, -1)])
 
 
-def _power(x: Floats, exponent: Ints, order: int) -> Floats:
-    """Derivative of the given order of x**exponent: ``(m,...)`` for exponents ``(m,)``."""
-    exponent = exponent.reshape(-1, *([1] * x.ndim))
-    factor = np.ones(exponent.shape)
-    for i in range(order):
-        factor = factor * (exponent - i)
-    return factor * x ** np.maximum(exponent - order, 0)
+def _powers(x: Floats, degree: int) -> Floats:
+    """Powers 0 to ``degree`` of ``x (...)`` with their first two derivatives: ``(3,degree+1,...)``."""
+    result = np.zeros((3, degree + 1, *x.shape))
+    result[0, 0] = 1.0
+    for i in range(1, degree + 1):
+        np.multiply(result[0, i - 1], x, out=result[0, i])
+        for order in (1, 2):
+            np.multiply(result[order - 1, i - 1], i, out=result[order, i])
+    return result
 
 
 def _monomial_derivatives(degree: int, points: Floats) -> tuple[Floats, Floats, Floats]:
     """Monomials at ``points (...,2)``: values ``(m,...)``, gradients ``(m,...,2)``, Hessians ``(m,...,2,2)``."""
     i, j = _monomials(degree).T
-    x, y = points[..., 0], points[..., 1]
-    px, py = ([_power(z, e, order) for order in range(3)] for z, e in ((x, i), (y, j)))
+    px, py = _powers(points[..., 0], degree)[:, i], _powers(points[..., 1], degree)[:, j]
     value = px[0] * py[0]
     gradient = np.stack([px[1] * py[0], px[0] * py[1]], axis=-1)
     mixed = px[1] * py[1]

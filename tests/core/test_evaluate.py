@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import curvify
-from curvify import evaluate, tables
+from curvify import evaluate, series, tables
 from curvify.jobs import SERIES_TOLERANCE
 from curvify.mesh import PolygonMesh
+from curvify.sampling import kite_sampling
+from curvify.schemes.gregory_basis import gregory_basis
 from curvify.weld import number_dense_mesh
 from surfaces import (
     CROSS_TANGENTS,
@@ -136,9 +138,47 @@ def test_every_number_of_chebyshev_points_serves_some_patch(monkeypatch: pytest.
     assert {16, 24, 32} <= found
 
 
-@pytest.mark.parametrize("count", tables.NODE_COUNTS)
+def fields_with_poles(distances: list[float], count: int) -> np.ndarray:
+    """Fields ``(3,f,1,m)`` with a pole at a distance from the middle of the side, patch by patch."""
+    t = series.chebyshev_points(count)
+    rows = np.array([1 / ((t - 0.5) ** 2 + distance**2) for distance in distances])
+    return np.stack([rows, 0.3 * rows, np.zeros_like(rows)])[:, :, None]
+
+
+@pytest.mark.parametrize("tolerance", [1e-9, 1e-12])
+def test_the_rate_of_a_series_tells_how_many_points_it_needs(tolerance: float) -> None:
+    distances = [5.0, 1.5, 0.8, 0.4]
+    told = series.points_needed(fields_with_poles(distances, 12), tolerance)
+    for distance, count in zip(distances, told.tolist(), strict=True):
+        least = next(m for m in range(12, 99) if series.points_needed(fields_with_poles([distance], m), tolerance) <= m)
+        assert abs(count - least) <= max(0.2 * least, 1)
+        t = np.linspace(0, 1, 200)
+        field = fields_with_poles([distance], least)[0, 0, 0]
+        gap = tables.lagrange(least, t)[0] @ field - 1 / ((t - 0.5) ** 2 + distance**2)
+        assert np.abs(gap).max() < tolerance * np.abs(field).max()
+    assert told[0] == 12
+    assert told[-1] > 24
+
+
+def test_fields_that_are_no_numbers_get_no_points() -> None:
+    fields = fields_with_poles([2.0, 2.0], 12)
+    fields[:, 1] = np.nan
+    assert series.points_needed(fields, 1e-9)[1] > 12
+
+
+@pytest.mark.parametrize("sides", [3, 5, 8, 12])
+def test_tables_of_points_that_are_turns_of_the_first_are_turned(sides: int) -> None:
+    points = kite_sampling(sides, 4).points
+    turned = gregory_basis(sides, points, corrected=True)
+    single = [gregory_basis(sides, place[None], corrected=True) for place in points]
+    for name in ("linear", "weights", "abscissae", "ends"):
+        expected = np.concatenate([getattr(basis, name) for basis in single], axis=1)
+        np.testing.assert_allclose(getattr(turned, name), expected, rtol=0, atol=2e-13)
+
+
+@pytest.mark.parametrize("count", series.NODE_COUNTS)
 def test_lagrange_polynomials_carry_polynomials_and_their_slopes(count: int) -> None:
-    nodes = tables.chebyshev_points(count)
+    nodes = series.chebyshev_points(count)
     t = np.concatenate([np.linspace(0, 1, 23), nodes])
     values, slopes = tables.lagrange(count, t)
     for power in (0, 1, 2, 5, 7):
