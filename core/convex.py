@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from curvify.arrays import values_of
+from curvify.arrays import distinct, values_of
 from curvify.errors import OptionError
 from curvify.mesh import Bools, Floats, Ints
 from curvify.polygons import (
+    all_distinct,
     cross_rows,
-    distinct,
     dot_rows,
     edge_keys,
     is_in,
@@ -133,7 +133,7 @@ def _faces_to_split(positions: Floats, offsets: Ints, vertices: Ints, max_sides:
             unsure = np.flatnonzero(~acceptable)
             if len(unsure):
                 acceptable[unsure] = judge(points[:, :, unsure]).acceptable
-            simple = distinct(ids)
+            simple = all_distinct(ids)
             bad = ~acceptable | ~simple | (size > max_sides)
             if not bad.any():
                 continue
@@ -154,7 +154,7 @@ def _gather(faces: Ints, corners: Ints, ids: Ints, rows: Floats, convex: Bools) 
     corners, ids = np.take_along_axis(corners, turned, axis=0), np.take_along_axis(ids, turned, axis=0)
     points = rows[:, ids]
     area = cross_rows(points - points[:, :1], np.roll(points, -1, axis=1) - points).sum(axis=1)
-    return Group(faces, corners, ids, lay_flat(points), dot_rows(area, area), convex, distinct(ids))
+    return Group(faces, corners, ids, lay_flat(points), dot_rows(area, area), convex, all_distinct(ids))
 
 
 def _first_corners(points: Floats) -> Ints:
@@ -205,7 +205,7 @@ def _cut_groups(groups: list[Group], edges: Ints, reasons: Ints, rule: str, max_
         done.append(pairs[~losers])
         if not losers.any():
             break
-        avoid = known = np.union1d(known, key[~losers])
+        avoid = known = distinct(np.concatenate([known, key[~losers]]))[0]
         lost = [np.flatnonzero(np.isin(group.faces, face[losers])) for group in groups]
         groups = [group.take(hit) for group, hit in zip(groups, lost, strict=True) if len(hit)]
     return np.concatenate(done)
@@ -243,7 +243,7 @@ def split_at_corners(
     offsets, vertices = split.face_offsets, split.face_vertices
     bad = np.asarray(bad_corners, dtype=bool)
     owner = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
-    pieces = np.unique(owner[bad])
+    pieces = distinct(owner[bad])[0]
     reasons = split.reasons & ~np.uint8(FOLDED)
     avoid = _edges_between(offsets, vertices, vertices[np.isin(owner, pieces)])
     found = [_old_pairs(split)]
@@ -252,12 +252,12 @@ def split_at_corners(
         start, end, worth = _folding_diagonals(rows, split, pieces, bad, normals, avoid)
         wide = worth >= least
         start, end, worth = start[wide], end[wide], worth[wide]
-        reasons[split.source_faces[np.setdiff1d(pieces, owner[start])]] |= FOLDED
+        reasons[split.source_faces[pieces[~np.isin(pieces, owner[start])]]] |= FOLDED
         keys = edge_keys(vertices[start], vertices[end])
         again = _repeats(keys, worth, owner[start])
         reasons[split.source_faces[owner[start[~again]]]] |= FOLDING
         found.append(split.source_corners[np.stack([start[~again], end[~again]], axis=1)])
-        avoid, pieces = np.union1d(avoid, keys), owner[start[again]]
+        avoid, pieces = distinct(np.concatenate([avoid, keys]))[0], owner[start[again]]
         if not len(pieces):
             break
     reasons[split.source_faces[pieces]] |= FOLDED

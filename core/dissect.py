@@ -15,10 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from curvify.arrays import distinct, values_of
 from curvify.mesh import Bools, Floats, Ints
 from curvify.polygons import (
     BACKWARD_COST,
-    distinct,
+    all_distinct,
     dot_rows,
     edge_keys,
     is_in,
@@ -81,7 +82,7 @@ def cut_group(group: Group, avoid: Ints | None, rule: str, max_sides: int) -> Cu
         (face, a, b), pieces = _cut_until(len(group.ids), which, choose)
         failed = np.zeros(len(group.faces), dtype=bool)
         for loop, at in pieces:
-            fine = judge(group.place[:, loop, at], up=True).acceptable & distinct(group.ids[loop, at])
+            fine = judge(group.place[:, loop, at], up=True).acceptable & all_distinct(group.ids[loop, at])
             failed[at[~fine | (len(loop) > max_sides)]] = True
         good = ~failed[face]
         found.append((face[good], a[good], b[good]))
@@ -170,7 +171,7 @@ def _cut_until(size: int, faces: Ints, choose: Chooser) -> tuple[Cut, list[tuple
         face = np.concatenate([part[1] for part in parts])
         start, span = choose(loop, face) if size > 3 else (face, np.zeros_like(face))
         pieces.append((loop[:, span == 0], face[span == 0]))
-        for width in np.unique(span[span > 0]):
+        for width in values_of(span[span > 0]):
             at = np.flatnonzero(span == width)
             near = loop[(start[at] + np.arange(width + 1)[:, None]) % size, at]
             far = loop[(start[at] + width + np.arange(size - width + 1)[:, None]) % size, at]
@@ -190,7 +191,7 @@ def _halve(group: Group, avoid: Ints | None, max_sides: int, loop: Ints, face: I
     ideal = (size - 2) * part / pieces
     low = max(1, size - 2 - (pieces - part) * (max_sides - 2), round(0.85 * ideal))
     high = min(size - 3, part * (max_sides - 2), round(1.15 * ideal))
-    spans = np.unique(np.linspace(low, max(low, high), 9).round().astype(np.int64)) + 1
+    spans = distinct(np.linspace(low, max(low, high), 9).round().astype(np.int64))[0] + 1
     start, span = np.zeros_like(face), np.zeros_like(face)
     for k in range(len(face)):
         points = group.place[:, loop[:, k], face[k]]
@@ -217,7 +218,7 @@ def _closest(group: Group, avoid: Ints | None, max_sides: int, loop: Ints, face:
     """The paper's rule (2.4): join the most concave vertex to the closest in sight that is no neighbor."""
     size, every = len(loop), np.arange(len(face))
     points, ids = group.place[:, loop, face], group.ids[loop, face]
-    fine = judge(points, up=True).acceptable & distinct(ids)
+    fine = judge(points, up=True).acceptable & all_distinct(ids)
     arrive = points - np.roll(points, 1, axis=1)
     leave = np.roll(arrive, -1, axis=1)
     turn = arrive[0] * leave[1] - arrive[1] * leave[0]
@@ -345,7 +346,7 @@ def _try_without(darts: _Darts, dart: Ints, twin: Ints, place: Floats, names: In
     verdict = judge(place[:, darts.tail[loop]], total, up=True)
     fits = verdict.acceptable
     if names is not None:
-        fits &= distinct(names[darts.tail[loop]], total)
+        fits &= all_distinct(names[darts.tail[loop]], total)
     darts.sharpest[loop[:, fits]], darts.sides[loop[:, fits]] = verdict.sharpest[fits], total[fits]
     for back in (dart[~fits], twin[~fits]):
         after[before[back]], before[after[back]] = back, back

@@ -327,7 +327,7 @@ def link_darts(tail: Ints, head: Ints, span: Ints, size: Ints) -> Ints:
     return np.asarray(order[np.searchsorted(keys[order], head * wide + size - span) - 1])
 
 
-def distinct(ids: Ints, counts: Ints | None = None) -> Bools:
+def all_distinct(ids: Ints, counts: Ints | None = None) -> Bools:
     """Whether the ids of each loop ``(m,B)`` differ; only the first ``counts (B,)`` rows where given."""
     if counts is not None:
         row = np.arange(len(ids))[:, None]

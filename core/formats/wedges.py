@@ -58,7 +58,9 @@ def split_vertices(mesh: PolygonMesh, dtype: np.dtype[np.floating], uvs: bool = 
     first, which = first_appearance(key)
     owner = mesh.face_vertices[first]
     leaders = first_appearance(owner)[0]
-    others = np.setdiff1d(np.arange(len(first)), leaders)
+    later = np.ones(len(first), dtype=bool)
+    later[leaders] = False
+    others = np.flatnonzero(later)
     others = others[np.argsort(owner[others], kind="stable")]
     corners = np.full(count, -1, dtype=np.int64)
     corners[owner[leaders]] = first[leaders]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from surfaces import torus
 
 CURVIFY = [sys.executable, "-c", "from curvify.cli.main import main; main()"]
 LONG = ["-k", "400"]  # minutes
+SAMPLES = Path(__file__).parents[2] / "sample_meshes"
 
 
 def imported(*args: str) -> set[str]:
@@ -67,6 +69,19 @@ def test_refine_imports_what_it_needs(folder):
         spare = {"numpy.ma", "numpy.random", "numpy.fft", "numpy.polynomial", "logging", "concurrent.futures"}
         ours = {"dissect", "subdivision", "shading", "quality", "trim", "simplify", "cli.report", "formats.ply_read"}
         assert not found & (spare | {f"curvify.{name}" for name in ours})
+
+
+def test_refining_folded_and_concave_faces_imports_no_more_than_that(folder):
+    shutil.copy(SAMPLES / "l_part.obj", folder)
+    text = (SAMPLES / "pawn.obj").read_text()
+    turned = text.replace("\nf ", "\nvn 1 0 .2\nvn .2 1 0\nvn 0 .2 1\nf ", 1).splitlines()
+    faces = [i for i, line in enumerate(turned) if line.startswith("f ")]
+    for i in faces:
+        turned[i] = " ".join(["f", *(f"{c}//{int(c) % 3 + 1}" for c in turned[i].split()[1:])])
+    (folder / "folded.obj").write_text("\n".join(turned) + "\n")
+    for name, out in (("l_part.obj", "dense.ply"), ("folded.obj", "dense.obj")):
+        found = imported("refine", name, out, "-k", "1", "--sharp-from", "normals")
+        assert not found & {"numpy.ma", "numpy.random", "numpy.polynomial", "scipy", "trimesh", "networkx"}
 
 
 def test_linear_algebra_runs_on_one_thread():
