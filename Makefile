@@ -5,8 +5,6 @@ BIN := $(VENV)/bin
 
 .PHONY: demo test lint goldens pictures gallery docs clean
 
-.PHONY: demo test lint goldens pictures gallery clean
-
 $(VENV)/demo.stamp: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .

@@ -105,7 +105,7 @@ def size(number: int) -> str:
 def as_line(name: str, finding: Finding, condition: str) -> str:
     """``cube.obj: watertight: no: 2 edges of one face only: edge 3-4, 4-7``."""
     if finding.limit:
-        condition += f" {finding.limit:g}"
+        condition += f" {finding.limit:,.0f}" if finding.limit >= 1000 else f" {finding.limit:g}"
     answer = "yes" if finding.passed else "no"
     line = ": ".join(part for part in (name, condition, answer, finding.reason) if part)
     if finding.passed or not finding.where:

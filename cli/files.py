@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, BinaryIO, cast
 
+from curvify.cli.memory import keep_memory
 from curvify.errors import CurvifyError, FormatError, OptionError
 from curvify.formats import READ_FORMATS, WRITE_FORMATS, atomic_file, find_format, read_mesh
 from curvify.mesh import PolygonMesh
@@ -89,7 +90,8 @@ def open_input(path: str, format: str | None) -> tuple[PolygonMesh, str]:
 
 
 def read_input(path: str, format: str | None) -> PolygonMesh:
-    """The mesh of IN."""
+    """The mesh of IN; what is read is then worked on."""
+    keep_memory()
     if path == STREAM and format is None:
         with hint("--input-format", format):
             return read_mesh(path)

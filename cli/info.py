@@ -20,8 +20,8 @@ EXAMPLES = (
     ("The same for a program", "curvify info coarse.obj --json"),
     ("What would a finer surface take?", "curvify info coarse.obj --level 20"),
 )
-#: Refine is tried on meshes of up to this many faces: beyond, that would take longer than a look should.
-MOST_FACES = 500_000
+#: Refine is tried on meshes of up to this many faces: beyond, that would take longer than all the rest.
+MOST_FACES = 100_000
 
 
 @with_refine_options(headings=(options.SURFACE, options.SHARP, options.MESH))
@@ -67,7 +67,8 @@ def prediction(mesh: PolygonMesh, coarse: Coarse | None, asked: Asked) -> dict[s
 
     told = {"scheme": asked.scheme, "level": asked.level}
     if mesh.face_count > MOST_FACES:
-        return {**told, "not_tried": f"the mesh has more than {MOST_FACES:,} faces"}
+        reason = f"the mesh has more than {MOST_FACES:,} faces; 'curvify refine' with --dry-run tries"
+        return {**told, "not_tried": reason}
     try:
         made = asked.surface(coarse or mesh)
     except CurvifyError as error:

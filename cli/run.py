@@ -6,7 +6,7 @@ import io
 import os
 import time
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -198,7 +198,6 @@ def refine_file(request: Request) -> Run:
     """Do what the command line asks for; what came of it. Raises CurvifyError."""
     console = Console(request.quiet, request.verbose)
     options, format = check(request)
-    keep_memory()
     seconds: dict[str, float] = {}
     with timed(seconds, "read"):
         mesh = files.read_input(request.input, request.input_format)
@@ -297,19 +296,6 @@ def _check_report(request: Request, report: str) -> None:
         for other, name in ((request.output, "OUT"), (request.input, "IN")):
             if other != files.STREAM and os.path.realpath(report) == os.path.realpath(other):
                 raise OptionError(f"{report}: {name} and --report cannot be the same file")
-
-
-def keep_memory() -> None:
-    """Ask glibc to keep the memory of work arrays rather than return it: fresh pages cost more than what is done on
-    them. Nothing happens with other C libraries.
-    """
-    import ctypes
-
-    with suppress(AttributeError, OSError, TypeError):
-        c_library = ctypes.CDLL(None)
-        c_library.gnu_get_libc_version  # noqa: B018
-        c_library.mallopt(-3, 32 << 20)  # M_MMAP_THRESHOLD
-        c_library.mallopt(-1, 256 << 20)  # M_TRIM_THRESHOLD
 
 
 @contextmanager

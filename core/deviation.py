@@ -7,13 +7,15 @@ float32, 280 MB installed) and trimesh with rtree 5.3 s. Distances are in units 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from functools import cached_property
 
 import numpy as np
 
+from curvify.arrays import cross
 from curvify.errors import MeshError
 from curvify.formats.others import triangulate
 from curvify.mesh import Floats, Ints, PolygonMesh
-from curvify.nearest import double_areas, nearest_points, places_on, spread
+from curvify.nearest import Nearest, corners_of, double_areas, places_on, spread
 from curvify.normals import degrees_between
 from curvify.palette import to_shown, value_colors
 
@@ -33,8 +35,13 @@ class Triangles:
         """Normals ``(n,3)`` at barycentric ``weights (n,3)`` of triangles: of the file (``smooth``) or of the plane."""
         if smooth and self.mesh.corner_normals is not None:
             return np.einsum("nk,nki->ni", weights, self.mesh.corner_normals[self.corners[triangles]])
-        a, b, c = np.moveaxis(self.positions[self.vertices[triangles]], 1, 0)
-        return np.cross(b - a, c - a)
+        a, b, c = corners_of(self.positions, self.vertices[triangles])
+        return cross(b - a, c - a)
+
+    @cached_property
+    def nearest(self) -> Nearest:
+        """What finds the nearest points on it."""
+        return Nearest.of(self.positions, self.vertices)
 
     @property
     def has_normals(self) -> bool:
@@ -50,11 +57,6 @@ def as_triangles(mesh: PolygonMesh) -> Triangles:
     if not sized.any():
         raise MeshError("the mesh has no face with an area; there is no surface to measure from")
     return Triangles(mesh, mesh.positions, corners[sized], vertices[sized])
-
-
-def nearest(points: Floats, surface: Triangles) -> tuple[Floats, Ints, Floats]:
-    """Distance ``(n,)`` of points from a surface, the nearest triangle ``(n,)`` and the place there ``(n,3)``."""
-    return nearest_points(points, surface.positions, surface.vertices)
 
 
 @dataclass(frozen=True)
@@ -91,11 +93,11 @@ def surfaces_apart(a: PolygonMesh, b: PolygonMesh, samples: int = SAMPLES) -> Ap
     for source, target in ((one, other), (other, one)):
         triangles, weights = spread(source.positions, source.vertices, samples)
         points = places_on(source.positions, source.vertices[triangles], weights)
-        far, hit, place = nearest(points, target)
+        far, hit, place = target.nearest(points)
         here = source.normals(triangles, weights, smooth)
         there = target.normals(hit, _weights(target, hit, place), smooth)
         vertices = _some(source.vertices.reshape(-1), samples)
-        corner_far = nearest(source.positions[vertices], target)[0]
+        corner_far = target.nearest(source.positions[vertices])[0]
         all_far = np.concatenate([far, corner_far])
         worst = int(all_far.argmax())
         spot = points[worst] if worst < len(points) else source.positions[vertices[worst - len(points)]]
@@ -123,11 +125,11 @@ def _some(vertices: Ints, most: int) -> Ints:
 
 def _weights(surface: Triangles, triangles: Ints, places: Floats) -> Floats:
     """Barycentric weights ``(n,3)`` of places in triangles."""
-    a, b, c = np.moveaxis(surface.positions[surface.vertices[triangles]], 1, 0)
-    normal = np.cross(b - a, c - a)
+    a, b, c = corners_of(surface.positions, surface.vertices[triangles])
+    normal = cross(b - a, c - a)
     square = np.einsum("ni,ni->n", normal, normal)
-    v = np.einsum("ni,ni->n", np.cross(places - a, c - a), normal) / square
-    w = np.einsum("ni,ni->n", np.cross(b - a, places - a), normal) / square
+    v = np.einsum("ni,ni->n", cross(places - a, c - a), normal) / square
+    w = np.einsum("ni,ni->n", cross(b - a, places - a), normal) / square
     return np.stack([1 - v - w, v, w], axis=1)
 
 
@@ -148,7 +150,7 @@ def deviations(mesh: PolygonMesh, reference: PolygonMesh, surface: bool = False)
     """
     if same_topology(mesh, reference) and not surface:
         return np.linalg.norm(mesh.positions - reference.positions, axis=1)
-    return nearest(mesh.positions, as_triangles(reference))[0]
+    return as_triangles(reference).nearest(mesh.positions)[0]
 
 
 def heat_map(mesh: PolygonMesh, values: Floats, most: float) -> PolygonMesh:

@@ -11,14 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from curvify.arrays import distinct, take_rows, values_of
+from curvify.arrays import distinct, ranking, take_rows, values_of
 from curvify.convex import REASONS, split_polygons
 from curvify.errors import MeshError
 from curvify.mesh import Bools, Floats, Ints, PolygonMesh
 from curvify.normals import degrees_between, unit
 from curvify.options import MeshOptions
 from curvify.prepare import Coarse, prepare_mesh
-from curvify.topology import Loops, clean_loops, components, is_closed, signed_volume
+from curvify.sectors import sharp_ends
+from curvify.topology import Loops, Topology, clean_loops, components, is_closed, signed_volume
 
 # --- edges ------------------------------------------------------------------------------------------------------
 
@@ -53,15 +54,21 @@ def pinched_vertices(coarse: Coarse) -> Ints:
     not reported here as well; faces at a crowded edge count as joined.
     """
     topology = coarse.topology
-    edge_order = np.argsort(topology.edge, kind="stable")
+    label = coarse.fans
+    if topology.nonmanifold.any():
+        label = components(len(label), *_joined_corners(topology))
+    firsts = np.flatnonzero(label == np.arange(len(label)))
+    return np.flatnonzero(np.bincount(topology.vertices[firsts], minlength=topology.vertex_count) > 1)
+
+
+def _joined_corners(topology: Topology) -> tuple[Ints, Ints]:
+    """Corners that lie side by side at the ends of edges of two faces or more, whichever way those run."""
+    edge_order = ranking(topology.edge)
     same = topology.edge[edge_order[1:]] == topology.edge[edge_order[:-1]]
     one, other = edge_order[:-1][same], edge_order[1:][same]
     turned = topology.forward[one] != topology.forward[other]
     tail, head = np.where(turned, topology.next[other], other), np.where(turned, other, topology.next[other])
-    links = np.concatenate([one, topology.next[one]]), np.concatenate([tail, head])
-    label = components(len(topology.vertices), *links)
-    firsts = np.flatnonzero(label == np.arange(len(label)))
-    return np.flatnonzero(np.bincount(topology.vertices[firsts], minlength=topology.vertex_count) > 1)
+    return np.concatenate([one, topology.next[one]]), np.concatenate([tail, head])
 
 
 def unused_vertices(mesh: PolygonMesh) -> Ints:
@@ -89,12 +96,21 @@ def same_loops(loops: Loops) -> Ints:
     first = np.arange(len(sizes))
     for size in values_of(sizes):
         rows = np.flatnonzero(sizes == size)
-        corners = np.sort(loops.vertices[loops.offsets[rows][:, None] + np.arange(size)], axis=1)
+        corners = loops.vertices[loops.offsets[rows][:, None] + np.arange(size)]
+        alike = _not_alone(corners.sum(axis=1))  # few are: only those are looked at closely
+        rows, corners = rows[alike], np.sort(corners[alike], axis=1)
         order = np.lexsort(corners.T)
         fresh = np.ones(len(rows), dtype=bool)
         fresh[1:] = (corners[order][1:] != corners[order][:-1]).any(axis=1)
         first[rows[order]] = rows[order[fresh]][np.cumsum(fresh) - 1]
     return first
+
+
+def _not_alone(keys: Ints) -> Bools:
+    """Which of some integers ``(n,)`` occur more than once."""
+    which = distinct(keys)[1]
+    alone: Bools = np.bincount(which) == 1
+    return ~alone[which]
 
 
 def repeated_loops(loops: Loops) -> Bools:
@@ -180,8 +196,8 @@ def volume(coarse: Coarse) -> float | None:
 
 def sharp_edges(coarse: Coarse) -> Bools:
     """Edges ``(E,)`` that are a crease at one end at least."""
-    sharp: Bools = np.logical_or(*coarse.features().sharp.T)
-    return sharp
+    start, end = sharp_ends(coarse.topology, coarse.sectors).T
+    return start | end
 
 
 def bends(coarse: Coarse, sharp: Bools) -> tuple[Ints, Floats]:

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from curvify.arrays import cross
+from curvify.arrays import by_component, cross, take_rows
 from curvify.mesh import Floats, Ints
+from curvify.normals import length
 from curvify.records import record
 
 #: The plastic number, whose powers spread points evenly over a square.
@@ -71,5 +72,11 @@ def places_on(positions: Floats, triangles: Ints, weights: Floats) -> Floats:
 
 def double_areas(positions: Floats, triangles: Ints) -> Floats:
     """Twice the area of each triangle ``(F,)``."""
-    a, b, c = np.moveaxis(positions[triangles], 1, 0)
-    return np.linalg.norm(cross(b - a, c - a), axis=1)
+    a, b, c = corners_of(positions, triangles)
+    return length(cross(b - a, c - a))
+
+
+def corners_of(positions: Floats, triangles: Ints) -> list[Floats]:
+    """The three corners ``(F,3)`` of each triangle."""
+    rows = by_component(positions)
+    return [take_rows(rows, triangles[:, i]) for i in range(3)]

@@ -6,6 +6,8 @@ Source: Leung, Wang, Zhang, section 2; the corner rule is one of our own for war
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from curvify.arrays import cross, take_rows
@@ -117,26 +119,32 @@ def _any_normals(positions: Floats, offsets: Ints, vertices: Ints, sectors: Ints
     return perpendicular(chosen[sectors[corners]])
 
 
-def _all_within(limit: float, a: Floats, b: Floats) -> bool:
-    """Whether no two vectors ``(n,3)`` are more than ``limit`` degrees apart; the first ones mostly tell already."""
-    return all(bool((degrees_between(a[rows], b[rows]) <= limit).all()) for rows in (slice(LOOK), slice(LOOK, None)))
+def _all_within(limit: float, a: Floats, b: Floats, which: Ints) -> bool:
+    """Whether no vector ``a (n,3)`` is more than ``limit`` degrees from its own of ``b``, row ``which (n,)``; one
+    without length there is no matter. The first ones mostly tell already.
+    """
+    for rows in (slice(LOOK), slice(LOOK, None)):
+        own = take_rows(b, which[rows])
+        if bool(((degrees_between(a[rows], own) > limit) & own.any(axis=1)).any()):
+            return False
+    return True
 
 
-def is_flat_shaded(normals: Floats, offsets: Ints, area: Floats, links: tuple[Ints, Ints]) -> bool:
+def is_flat_shaded(
+    normals: Floats, offsets: Ints, area: Floats, links: Callable[[], tuple[Ints, Ints]]
+) -> bool:
     """Whether given corner normals ``(C,3)`` only repeat the faces' own: a flat-shaded export.
 
     True when every face has one normal for all its corners, or every corner normal equals its face's, given by the
-    area vectors ``area (F,3)``, within half a degree, and corners side by side at an edge, ``links``, never share
+    area vectors ``area (F,3)``, within half a degree, and corners side by side at an edge, ``links()``, never share
     one where their faces differ (they do on a fine smooth mesh).
     """
     sizes = np.diff(offsets)
-    first = np.repeat(normals[offsets[:-1]], sizes, axis=0)
-    if _all_within(SAME_NORMAL, normals, first):
+    if _all_within(SAME_NORMAL, normals, normals, np.repeat(offsets[:-1], sizes)):
         return True
-    own = np.repeat(area, sizes, axis=0)
-    sized = own.any(axis=1)
-    if not _all_within(FLAT_SHADED, normals[sized], own[sized]):
+    faces = np.repeat(np.arange(len(sizes)), sizes)
+    if not _all_within(FLAT_SHADED, normals, area, faces):
         return False
-    a, b = links
-    bent = degrees_between(own[a], own[b]) > SAME_NORMAL
+    a, b = links()
+    bent = degrees_between(take_rows(area, faces[a]), take_rows(area, faces[b])) > SAME_NORMAL
     return not bool((degrees_between(normals[a[bent]], normals[b[bent]]) <= SAME_NORMAL).any())

@@ -10,7 +10,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from curvify.arrays import by_component, take_rows
+from curvify.arrays import all_finite, by_component, take_rows
 from curvify.edges import Directions, edge_curves, smooth_tangents
 from curvify.errors import MeshError
 from curvify.marks import ResolvedMarks, explicit_marks, found_marks, gather_marks, hole_faces
@@ -268,14 +268,17 @@ def _given_normals(
     """The normals of the file, unless they only repeat its flat faces, and what there is to say about them."""
     if mesh.corner_normals is None:
         return GivenNormals(None, [])
-    given = np.nan_to_num(mesh.corner_normals[loops.source_corners], posinf=0.0, neginf=0.0)
+    given = by_component(take_rows(mesh.corner_normals, loops.source_corners))
+    if not all_finite(given):
+        given = np.nan_to_num(given, posinf=0.0, neginf=0.0)
     off = np.flatnonzero(np.abs(np.einsum("ci,ci->c", given, given) - 1) > UNIT)
-    given[off] = unit(given[off] / np.maximum(np.abs(given[off]).max(axis=1, keepdims=True), 1e-300))
+    rows = take_rows(given, off)
+    given[off] = unit(rows / np.maximum(np.abs(rows).max(axis=1, keepdims=True), 1e-300))
     present = given.any(axis=1)
     if not present.any():
         return GivenNormals(None, [])
     asked = sharp_from == "normals"
-    if not asked and present.all() and is_flat_shaded(given, loops.offsets, area, corner_links(topology)):
+    if not asked and present.all() and is_flat_shaded(given, loops.offsets, area, partial(corner_links, topology)):
         note = "the file's normals only repeat its flat faces and are ignored; keep them with --sharp-from normals"
         return GivenNormals(None, [note] if _normals_differ(topology, given) else [])
     missing = int((~present).sum())

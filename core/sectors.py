@@ -83,7 +83,7 @@ def resolve_features(
     ``directions`` is the scheme's rule for edge ends where nothing is sharp and no mark bends the edge.
     """
     normals, computed = _starting_normals(topology, positions, area, sectors, given, marks)
-    sharp = _sharp_ends(topology, sectors)
+    sharp = sharp_ends(topology, sectors)
     lines, turned = line_tangents(topology, positions, sharp, marks.straight)
     lined = np.linalg.norm(lines, axis=1) > 0
     tangled = _touched(topology, topology.nonmanifold)
@@ -234,7 +234,7 @@ def _soften(
     normals[soft] = unit((1 - g) * mean + g * normals[soft])
 
 
-def _sharp_ends(topology: Topology, sectors: Ints) -> Bools:
+def sharp_ends(topology: Topology, sectors: Ints) -> Bools:
     """Ends ``(E,2)`` of interior edges where the two faces lie in different sectors."""
     sharp = np.zeros((len(topology.edges), 2), dtype=bool)
     one = np.flatnonzero((topology.twin >= 0) & topology.forward)

@@ -10,6 +10,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from curvify.arrays import cross, values_of
 from curvify.errors import FormatError
 from curvify.formats.obj_write import round_to
 from curvify.formats.references import referenced_files
@@ -272,7 +273,7 @@ def triangulate(mesh: PolygonMesh) -> Ints:
     sizes, starts = mesh.face_sizes, mesh.face_offsets[:-1]
     offsets = np.concatenate([[0], np.cumsum(np.maximum(sizes - 2, 0))])
     out = np.empty((int(offsets[-1]), 3), dtype=np.int64)
-    for size in np.unique(sizes[sizes >= 3]).tolist():
+    for size in values_of(sizes[sizes >= 3]):
         faces = np.flatnonzero(sizes == size)
         corners = starts[faces, None] + np.arange(size)
         local = _local_triangles(mesh.positions[mesh.face_vertices[corners]])
@@ -289,9 +290,9 @@ def _local_triangles(points: Floats) -> Ints:
     local = np.tile(fan, (count, 1, 1))
     if size == 3:
         return local
-    area = np.cross(points, np.roll(points, -1, axis=1)).sum(axis=1)
+    area = cross(points, np.roll(points, -1, axis=1)).sum(axis=1)
     a, b, c = (points[:, fan[:, k]] for k in range(3))
-    facing = np.einsum("fti,fi->ft", np.cross(b - a, c - a), area)
+    facing = np.einsum("fti,fi->ft", cross(b - a, c - a), area)
     for face in np.flatnonzero((facing <= 0).any(axis=1)).tolist():
         ears = _ears(points[face], area[face])
         if ears is not None:
@@ -310,6 +311,6 @@ def _ears(points: Floats, normal: Floats) -> Ints | None:
     if len(triangles) != len(points) - 2:
         return None
     a, b, c = (points[triangles[:, k]] for k in range(3))
-    turned = np.cross(b - a, c - a) @ normal < 0
+    turned = cross(b - a, c - a) @ normal < 0
     triangles[turned] = triangles[turned][:, ::-1]
     return triangles

@@ -29,6 +29,11 @@ def test_no_is_1_and_says_where(call, folder):
     assert (quiet.code, quiet.out) == (1, b"")
 
 
+def test_large_limits_are_written_out(call, folder):
+    result = call("check", "cube.obj", "--max-faces", "1000000")
+    assert result.out.decode() == "cube.obj: max-faces 1,000,000: yes: 6 faces\n"
+
+
 def test_json(call, folder):
     result = call("check", "dart.obj", "--convex", "--max-sides", "3", "--json")
     assert result.code == 1
