@@ -39,3 +39,19 @@ def test_loop_subdivision_keeps_to_its_limit(contents):
     coarse = meshes.triangulated(meshes.sample("mushroom"))
     once, twice = meshes.at_limit(coarse), meshes.at_limit(meshes.subdivided(coarse))
     assert np.abs(twice.positions[: coarse.vertex_count] - once.positions).max() < 1e-12
+
+
+def test_outlines_of_regions_are_split_along_the_diagonals(contents):
+    import meshes
+
+    from curvify import refine
+    from curvify.convex import split_polygons
+    from curvify.formats.dense import to_polygon_mesh
+    from curvify.simplify import Options, simplify
+
+    dense = meshes.triangulated(to_polygon_mesh(refine(meshes.sample("mushroom"), level=3)))
+    options = Options(faces=30)
+    whole, concave, pieces, diagonals = meshes.outlines(simplify(dense, options), options)
+    assert len(concave) > 0
+    assert 2 * (pieces.face_count - whole.face_count) == len(diagonals)  # each is a side of two pieces
+    assert not split_polygons(pieces.positions, pieces.face_offsets, pieces.face_vertices).reasons.any()

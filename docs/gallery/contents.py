@@ -53,10 +53,11 @@ PAPERS = (
                 "simplified",
                 "8",
                 "From a dense mesh to polygons and back: the triangles; regions that are nearly flat, found by "
-                "variational shape approximation; convex polygons for them; the surface over the polygons, with the "
-                "normals and creases that were found.",
+                "variational shape approximation; a polygon for each region, the concave ones with red outlines; those "
+                "split along the red diagonals; neighbors merged again where the polygon stays convex and nearly flat; "
+                "the surface, with the normals and creases that were found.",
                 simplified,
-                {"size": (220, 300)},
+                {"size": (220, 300), "columns": 3},
             ),
             Figure(
                 "fullness",

@@ -23,6 +23,7 @@ from meshes import (
     curves_of,
     loop_surface,
     marks_of,
+    outlines,
     regions,
     sample,
     subdivided,
@@ -79,15 +80,21 @@ def construction() -> list[Panel]:
 
 
 def simplified() -> list[Panel]:
-    """Dense triangles, their regions, the polygons, and the surface over these."""
+    """Dense triangles, their regions, the regions' polygons before and after concave ones are split, the polygons after
+    merging, and the surface over these.
+    """
     dense = triangulated(to_polygon_mesh(curvify.refine(sample("pawn"), level=4)))
-    found = simplify(dense, Options(faces=110))
+    options = Options(faces=110)
+    found = simplify(dense, options)
     apart, shades, borders = regions(found)
     lines = [Lines(borders, Stroke(width=1.4))]
+    whole, concave, pieces, diagonals = outlines(found, options)
     return [
         Panel([Layer(dense, shading="flat", wire=Stroke(width=0.4))], f"{dense.face_count:,} triangles"),
         Panel([Layer(apart, "values", shading="flat", values=shades, lines=lines)], "regions"),
-        coarse(found.mesh, f"{found.mesh.face_count} polygons"),
+        coarse(whole, "one polygon each", concave),
+        coarse(pieces, "convex pieces", diagonals),
+        coarse(found.mesh, f"merged: {found.mesh.face_count} polygons"),
         surface(found.mesh, "surface"),
     ]
 

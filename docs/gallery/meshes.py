@@ -9,11 +9,17 @@ import numpy as np
 import numpy.typing as npt
 
 import curvify
+from curvify.convex import split_polygons
 from curvify.formats.dense import to_polygon_mesh
 from curvify.formats.marks_json import read_marks
 from curvify.normals import sum_by, unit
 from curvify.polygons import newell_normals
-from curvify.simplify import Simplified
+from curvify.simplify import Options, Simplified
+from curvify.simplify.attempts import SHARP_TOLERANCE, SMOOTH_TOLERANCE
+from curvify.simplify.borders import Tolerance, chords_of, find_anchors, region_borders
+from curvify.simplify.decompose import Partition, polygonize
+from curvify.simplify.features import sharp_half_edges
+from curvify.simplify.vsa import Metric
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_meshes"
 Floats = npt.NDArray[np.float64]
@@ -117,6 +123,28 @@ def regions(found: Simplified) -> tuple[curvify.PolygonMesh, Floats, Floats]:
     border = np.flatnonzero((twin >= 0) & (own < own[twin]))
     ends = np.stack([border, border - border % 3 + (border + 1) % 3], axis=1)
     return apart, np.repeat(shade.astype(float), 3), dense.positions[dense.vertices.reshape(-1)[ends]]
+
+
+def outlines(found: Simplified, options: Options) -> tuple[curvify.PolygonMesh, Ints, curvify.PolygonMesh, Ints]:
+    """One polygon for each region, before concave ones are split, with the edges of those ``(n,2)``; the convex pieces,
+    with the diagonals ``(n,2)`` that made them.
+    """
+    dense = found.dense
+    sharp = sharp_half_edges(dense, options.sharp_angle)
+    size = np.sqrt(dense.areas.sum() / found.mesh.face_count)
+    tolerance = Tolerance(SHARP_TOLERANCE * size, SMOOTH_TOLERANCE * size)
+    partition = Partition(dense, Metric.of(dense), sharp, tolerance, options.split_rule, found.labels)
+    polygonize(partition)
+    borders = region_borders(dense, partition.labels, partition.normals, sharp)
+    chords = chords_of(borders, find_anchors(dense, borders, partition.forced, tolerance))
+    offsets = np.searchsorted(chords.regions, np.arange(partition.count + 1))
+    split = split_polygons(dense.positions, offsets, chords.ends[:, 0], rule=options.split_rule)
+    cut = np.bincount(split.source_faces, minlength=partition.count) > 1
+    heads = np.concatenate([np.roll(part, -1) for part in np.split(split.face_vertices, split.face_offsets[1:-1])])
+    diagonals = np.stack([split.face_vertices, heads], axis=1)[split.diagonals >= 0]
+    whole = curvify.PolygonMesh(dense.positions, offsets, chords.ends[:, 0])
+    pieces = curvify.PolygonMesh(dense.positions, split.face_offsets, split.face_vertices)
+    return whole, chords.ends[cut[chords.regions]], pieces, diagonals
 
 
 # --- Loop's subdivision surface of a closed mesh of triangles --------------------------------------------------------
