@@ -106,8 +106,8 @@ PAPERS = (
             Figure(
                 "png1-silhouettes",
                 "2",
-                "A dodecahedron cut into triangles: PN triangles meet in kinks, at which reflections break; those of "
-                "PNG1 triangles run on.",
+                "A dodecahedron, which both schemes cut into triangles: PN triangles meet in kinks, at which "
+                "reflections break; those of PNG1 triangles run on.",
                 silhouettes,
                 {"stripes": 6},
             ),
@@ -149,7 +149,7 @@ PAPERS = (
                 "blend-features",
                 "3",
                 "Sharp edges in red and what they make: darts, which fade where the edges end; a crease around the "
-                "ring; a cube with corners where its red edges meet.",
+                "ring; a corner where three red edges of a cube meet.",
                 feature_kinds,
                 {"columns": 6, "size": (190, 180), "fit": "each"},
             ),
