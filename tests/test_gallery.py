@@ -43,7 +43,6 @@ def test_loop_subdivision_keeps_to_its_limit(contents):
 
 def test_outlines_of_regions_are_split_along_the_diagonals(contents):
     import meshes
-
     from curvify import refine
     from curvify.convex import split_polygons
     from curvify.formats.dense import to_polygon_mesh

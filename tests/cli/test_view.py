@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from chromium import browser_or_skip, screenshot
+from chromium import browser_or_skip, screenshot, touched_browser
 from curvify.cli.main import run
 from curvify.formats import write_mesh
 from surfaces import on_sphere, truncated_icosahedron
@@ -98,8 +99,8 @@ const wait = setInterval(() => {
 
 
 @pytest.fixture(scope="module")
-def frames(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
-    """Pictures ``(h,w,3)`` of one page in several states, by the names of ``FRAMES``: one run of the browser."""
+def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a page, ``page.html``, and others in which things happen."""
     browser_or_skip()
     folder = tmp_path_factory.mktemp("pages")
     coarse = on_sphere(truncated_icosahedron())
@@ -113,9 +114,16 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
     (folder / "page.html").write_text(page)
     (folder / "pressed.html").write_text(page.replace("</body>", PRESS.replace("KEYS", str(KEYS))))
     (folder / "gestures.html").write_text(page.replace("</body>", GESTURES.replace("SHIFT", str(list(SHIFT)))))
-    pages = {name: "gestures" if "gesture=" in state else "page" for name, state in FRAMES.items()}
-    pages["pressed"] = "pressed"
-    sources = [f"{pages[name]}.html#{state}" for name, state in FRAMES.items()]
+    return folder
+
+
+@pytest.fixture(scope="module")
+def frames(pages: Path) -> dict[str, np.ndarray]:
+    """Pictures ``(h,w,3)`` of one page in several states, by the names of ``FRAMES``: one run of the browser."""
+    folder = pages
+    shown_page = {name: "gestures" if "gesture=" in state else "page" for name, state in FRAMES.items()}
+    shown_page["pressed"] = "pressed"
+    sources = [f"{shown_page[name]}.html#{state}" for name, state in FRAMES.items()]
     shown = "".join(f'<iframe src="{source}"></iframe>' for source in sources)
     look = f"body{{margin:0;font-size:0}}iframe{{border:0;width:{WIDE}px;height:{HIGH}px}}"
     (folder / "all.html").write_text(f"<!DOCTYPE html><style>{look}</style><body>{shown}</body>")
@@ -214,6 +222,43 @@ def test_fingers_and_the_wheel_zoom(frames):
 
 def test_a_double_click_goes_back(frames):
     assert near(frames["reset"], frames["plain"])
+
+
+#: Counts fingers, apart from what scripts do.
+COUNT = """seen = 0; document.getElementById("view").addEventListener("pointerdown",
+  (event) => { seen += event.isTrusted && event.pointerType === "touch"; });"""
+
+
+def straight(start: tuple[float, float], end: tuple[float, float], steps: int = 6) -> list[tuple[float, float]]:
+    """Places of a finger that moves evenly, from the middle of the page."""
+    shares = [k / steps for k in range(steps + 1)]
+    x, y = WIDE / 2, HIGH / 2
+    return [(x + start[0] + s * (end[0] - start[0]), y + start[1] + s * (end[1] - start[1])) for s in shares]
+
+
+def test_real_fingers_turn_shift_and_zoom(pages, frames, tmp_path):
+    x, y = SHIFT
+    states = {
+        "control=0": [[straight((0, 0), (-25, 12.5))]],
+        "control=0&parallel=1": [[straight((-40, 10), (-40 + x, 10 + y)), straight((50, -20), (50 + x, -20 + y))]],
+        "control=0&": [[straight((-60, -30), (-90, -45)), straight((60, 30), (90, 45))]],
+        "control=0&view=90,0": [[straight((5, 5), (5, 5), 1)]] * 2,
+    }
+    shown = []
+    with touched_browser(tmp_path / "profile") as browser:
+        for state, gestures in states.items():
+            page = browser.open(f"{(pages / 'page.html').as_uri()}#{state}", (WIDE, HIGH))
+            page.value(COUNT)
+            for fingers in gestures:
+                page.touch(*fingers)
+            shown.append(np.asarray(Image.open(io.BytesIO(page.picture())).convert("RGB")).astype(int))
+            assert page.value("[visualViewport.scale, scrollX, scrollY]") == [1, 0, 0]  # the page itself stays
+            assert page.value("seen") == sum(map(len, gestures))
+    turned, shifted, zoomed, reset = shown
+    assert near(turned, frames["turned"]) and not near(turned, frames["plain"])
+    assert near(shifted, np.roll(frames["parallel"], (y, x), axis=(0, 1)))
+    assert near(zoomed, frames["closer"]) and not near(zoomed, frames["plain"])
+    assert near(reset, frames["plain"])  # two taps
 
 
 def test_to_a_file_and_through_a_pipe(process, folder):
