@@ -12,6 +12,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+import yaml
 
 from opengl import device_or_skip
 
@@ -74,7 +75,8 @@ def shell_blocks(page: str) -> list[str]:
 def test_the_page_on_checking_works_as_written(bash, tmp_path: Path) -> None:
     shutil.copy(ROOT / "sample_meshes" / "pawn.obj", tmp_path / "part.obj")
     (tmp_path / "assets" / "inner").mkdir(parents=True)
-    shutil.copy(tmp_path / "part.obj", tmp_path / "assets" / "inner")
+    for folder in ("assets", "assets/inner"):
+        shutil.copy(tmp_path / "part.obj", tmp_path / folder)
     blocks = shell_blocks("checking.md")
     assert len(blocks) >= 5
     for block in blocks:
@@ -86,6 +88,45 @@ def test_the_page_on_checking_works_as_written(bash, tmp_path: Path) -> None:
     (code,) = re.findall(r"```python\n(.*?)```", (DOCS / "checking.md").read_text(encoding="utf-8"), re.DOTALL)
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stdout.splitlines()[-1]) == (0, "0")
+
+
+def test_the_recipes_for_scripts_tell_what_differs(bash, tmp_path: Path) -> None:
+    (tmp_path / "assets").mkdir()
+    for name in ("ring", "vase"):
+        shutil.copy(ROOT / "sample_meshes" / f"{name}.obj", tmp_path / "assets")
+    text = (DOCS / "checking.md").read_text(encoding="utf-8")
+    goldens, closed = re.findall(r"```bash\n(.*?)```", text, re.DOTALL)
+    bash(next(block for block in shell_blocks("checking.md") if "--output-dir golden" in block))
+    assert bash(goldens) == ""
+    ring = tmp_path / "assets" / "ring.obj"
+    ring.write_text(re.sub(r"^v \S+", "v 3", ring.read_text(), count=1, flags=re.MULTILINE))
+    (tmp_path / "check.sh").write_text(goldens)
+    assert bash("sh check.sh || echo $?") == "golden/ring.ply differs\n1\n"
+    assert bash(closed) == "assets/vase.obj is not closed\n"
+
+
+def test_the_recipes_for_servers_work_as_written(bash, tmp_path: Path) -> None:
+    shutil.copy(ROOT / "sample_meshes" / "pawn.obj", tmp_path / "part.obj")
+    bash("curvify refine part.obj golden.ply --level 3")
+    text = (DOCS / "checking.md").read_text(encoding="utf-8")
+    github, gitlab = (yaml.safe_load(block) for block in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL))
+    lines = [step["run"] for step in github["jobs"]["golden"]["steps"] if "run" in step]
+    assert lines == gitlab["golden"]["script"] and lines[0] == "pip install ./curvify"
+    bash("\n".join(lines[1:]))
+    assert (tmp_path / "heat.ply").exists()
+
+
+def test_groups_become_creases_as_the_page_says(bash, tmp_path: Path) -> None:
+    lines = (ROOT / "sample_meshes" / "knob.obj").read_text().splitlines()
+    faces = [line for line in lines if line.startswith("f ")]
+    rest = [line for line in lines if line[:2] not in ("f ", "g ", "s ")]
+    grouped = ["g top", *faces[:20], "g below", *faces[20:30], "g top", *faces[30:]]
+    (tmp_path / "part.obj").write_text("\n".join(rest + grouped) + "\n")
+    (recipe,) = (block for block in shell_blocks("sharp-features.md") if "awk" in block)
+    bash(recipe)
+    said = bash("curvify info grouped.obj")
+    assert "2 smoothing groups" in said
+    assert re.search(r"from groups: [1-9]", said)
 
 
 def test_the_first_five_minutes_work_as_written(bash, tmp_path: Path) -> None:
