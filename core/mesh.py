@@ -19,6 +19,8 @@ from curvify.records import field, record, replaced
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from curvify.formats.looks import Looks
+
     Floats = NDArray[np.floating]
     Ints = NDArray[np.integer]
     Bools = NDArray[np.bool_]
@@ -116,7 +118,8 @@ class PolygonMesh:
     none; ``vertex_colors (V,3|4)`` as stored (uint8 or float); ``face_materials``,
     ``face_groups (F,)`` index into ``material_names``, ``group_names`` (-1: none);
     ``face_smoothing (F,)`` the smoothing group of each face (0: off), None where the file says nothing.
-    ``position_dtype`` is the type the file stored positions in, for ``--precision input``.
+    ``looks`` is what the materials of a glTF file look like, for other glTF files. ``position_dtype`` is the type the
+    file stored positions in, for ``--precision input``.
     """
 
     positions: Floats
@@ -131,6 +134,7 @@ class PolygonMesh:
     face_groups: Ints | None = None
     group_names: tuple[str, ...] = ()
     face_smoothing: Ints | None = None
+    looks: Looks | None = None
     marks: Marks = field(default_factory=Marks)
     position_dtype: np.dtype[np.floating] = field(default_factory=lambda: np.dtype(np.float64))
     warnings: tuple[str, ...] = ()

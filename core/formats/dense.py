@@ -182,7 +182,7 @@ def _sink(out: BinaryIO, format: str, ascii: bool, triangulate: bool, streamed: 
     else:
         collected = ArraySink()
         yield collected
-        mesh = to_polygon_mesh(collected.dense_mesh(), triangulate)
+        mesh = to_polygon_mesh(collected.dense_mesh(), triangulate).with_(looks=collected.layout.mesh.looks)
         write_stream(mesh, out, format)
 
 

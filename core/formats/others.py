@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from curvify.arrays import cross, values_of
 from curvify.errors import FormatError
+from curvify.formats.looks import Looks, add_looks, read_looks
 from curvify.formats.obj_write import round_to
 from curvify.formats.references import referenced_files
 from curvify.formats.wedges import Wedges, split_vertices, wedge_rows
@@ -45,14 +46,17 @@ def read_other(data: bytes, name: str, format: str) -> PolygonMesh:
     """Parse a file of a format that it reads into a triangle mesh.
 
     All parts of a scene are put together, transformed. Vertices stay as the file has them, not merged.
-    Normals, uvs and vertex colors are kept where every part has them, materials by their names.
-    Raises FormatError for whatever trimesh cannot read.
+    Normals and vertex colors are kept where every part has them, uvs where one has, materials by their names, with what
+    those of glTF look like. Raises FormatError for whatever trimesh cannot read.
     """
     missing = [path for path in referenced_files(name) if not Path(path).is_file()]
     if missing:
         raise FormatError(f"{name}: it refers to {missing[0]}, and there is no such file")
     trimesh = _import_trimesh()
+    looks: Looks | None = None
     try:
+        if format in ("glb", "gltf"):
+            data, looks = read_looks(data, format, Path(name).parent)
         loaded = trimesh.load(io.BytesIO(data), file_type=format, process=False, **_neighbors(name, format, trimesh))
         parts = _parts(loaded, trimesh)
     except ImportError as error:
@@ -61,7 +65,7 @@ def read_other(data: bytes, name: str, format: str) -> PolygonMesh:
         raise FormatError(f"{name}: this cannot be read as {format}: {_one_line(error)}") from None
     if not parts:
         raise FormatError(f"{name}: {_why_empty(data, format)}")
-    return _join(parts, name)
+    return _join(parts, name).with_(looks=looks)
 
 
 def _neighbors(name: str, format: str, trimesh: Any) -> dict[str, Any]:
@@ -138,7 +142,7 @@ def _join(parts: list[_Part], name: str) -> PolygonMesh:
     normals = _stack([part.normals for part in parts])
     if normals is not None:
         normals[~(np.isfinite(normals).all(axis=1) & normals.any(axis=1))] = np.nan
-    uvs = _stack([part.uvs for part in parts])
+    uvs = _stack_uvs(parts)
     return PolygonMesh(
         positions,
         np.arange(len(corners) // 3 + 1, dtype=np.int64) * 3,
@@ -165,6 +169,14 @@ def _stack(arrays: list[Any]) -> Any:
     """The arrays one after the other, or None unless every part has one."""
     present = [array for array in arrays if array is not None]
     return np.concatenate(present) if len(present) == len(arrays) else None
+
+
+def _stack_uvs(parts: list[_Part]) -> Floats | None:
+    """Texture coordinates of all parts, NaN for those that have none, or None if no part has any."""
+    if all(part.uvs is None for part in parts):
+        return None
+    blank = [np.full((len(part.positions), 2), np.nan) for part in parts]
+    return np.concatenate([b if part.uvs is None else part.uvs for part, b in zip(parts, blank, strict=True)])
 
 
 def _stored_normals(part: Any) -> Floats | None:
@@ -195,8 +207,8 @@ def _stored_uvs(part: Any) -> Floats | None:
 def write_other(mesh: PolygonMesh, out: BinaryIO, format: str) -> None:
     """Write ``mesh`` in a format that trimesh writes, polygons cut into triangles.
 
-    Positions are rounded to float32, as most of these formats store them. GLB takes normals, uvs, colors and the names
-    of materials along; a mesh of several materials becomes as many parts. STL and 3MF hold nothing but the shape, as
+    Positions are rounded to float32, as most of these formats store them. GLB takes normals, uvs, colors and
+    materials along; a mesh of several materials becomes as many parts. STL and 3MF hold nothing but the shape, as
     trimesh writes them: their vertices are not repeated for what they would lose. Raises FormatError where trimesh
     cannot write.
     """
@@ -207,6 +219,8 @@ def write_other(mesh: PolygonMesh, out: BinaryIO, format: str) -> None:
         content: Any = made.export(file_type=format)
     except Exception as error:
         raise FormatError(f"writing {format} failed: {_one_line(error)}") from None
+    if format == "glb" and mesh.looks is not None:
+        content = add_looks(content, mesh.looks)
     out.write(content.encode() if isinstance(content, str) else content)
 
 
@@ -250,7 +264,7 @@ def _part(mesh: PolygonMesh, trimesh: Any, wedges: Wedges, used: Ints, triangles
 
 
 def _texture(uvs: Floats | None, name: str | None, colors: NDArray[np.uint8] | None) -> Any:
-    """Texture coordinates and a material without a texture: any other would want an image library."""
+    """Texture coordinates and a material with a name alone: ``add_looks`` tells what it looks like."""
     from trimesh.visual import TextureVisuals, material
 
     textured: Any = TextureVisuals
