@@ -197,7 +197,8 @@ def _lines(name: str, answer: dict[str, Any]) -> list[str]:
     apart, heat = answer.get("apart"), answer.get("heatmap")
     if apart is not None and not answer["checks"]:
         lines.append(
-            f"{name}: up to {apart['hausdorff']:.4g} apart, rms {apart['rms']:.4g}, mean {apart['mean']:.4g}; normals "
+            f"{name}: up to {apart['hausdorff']:.4g} apart, {100 * apart['share']:.3g} % of A's diagonal, "
+            f"rms {apart['rms']:.4g}, mean {apart['mean']:.4g}; normals "
             f"{apart['normal_most']:.3g} degrees in 99 of 100 places, {apart['normal_mean']:.3g} in the mean"
         )
     if heat is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from curvify.words import count_of
+from curvify.words import count_of, marks_of
 
 _SIDES = {"3": "triangle", "4": "quad", "5": "pentagon", "6": "hexagon"}
 
@@ -109,12 +109,7 @@ def _attributes(info: dict[str, Any]) -> str:
 
 
 def _marks(marks: dict[str, dict[str, int]]) -> str:
-    sources = [
-        f"from {source}: " + ", ".join(f"{number:,} {kind}" for kind, number in kinds.items())
-        for source, kinds in marks.items()
-        if kinds
-    ]
-    return "; ".join(sources) or "none"
+    return "; ".join(f"from {source}: {marks_of(kinds)}" for source, kinds in marks.items() if kinds) or "none"
 
 
 def _refine(refine: dict[str, Any]) -> str:

@@ -25,7 +25,7 @@ from curvify.refinement import Refinable, refinable
 from curvify.schemes import NAMES, load_scheme
 from curvify.sinks import DenseLayout, Sink
 from curvify.threads import processors
-from curvify.words import count_of, listed
+from curvify.words import count_of, listed, marks_of
 
 if TYPE_CHECKING:
     from curvify.cli.report import Recorder
@@ -331,7 +331,7 @@ def _refine(run: Run, console: Console) -> None:
     console.explain(f"{request.source}: {_sizes(run.surface.counts)}")
     console.explain(f"scheme {request.scheme}, {run.surface.amount(request.level)}, {options}, {run.dtype.name}")
     for source, counts in run.surface.marks.items():
-        console.explain(f"{source}: {', '.join(count_of(number, kind) for kind, number in counts.items())}")
+        console.explain(f"{source}: {marks_of(counts)}")
     recorder = _recorder(run)
     with ExitStack() as stack:
         with timed(run.seconds, "open_backend"):

@@ -48,7 +48,7 @@ def compare_surfaces(
     findings = []
     if tolerance is not None:
         at = ", ".join(f"{x:.6g}" for x in apart.at)
-        reason = f"up to {apart.hausdorff:.4g} apart, at ({at}), rms {apart.rms:.4g}"
+        reason = f"up to {apart.hausdorff:.4g} ({100 * apart.share:.3g} %) apart, at ({at}), rms {apart.rms:.4g}"
         findings.append(Finding("surface", apart.hausdorff <= tolerance, reason, tolerance, apart.hausdorff))
     if normal_tolerance is not None:
         reason = f"{apart.normal_most:.4g} degrees apart in 99 of 100 places, {apart.normal_mean:.4g} in the mean"

@@ -63,12 +63,14 @@ def as_triangles(mesh: PolygonMesh) -> Triangles:
 class Apart:
     """How far surface A is from surface B, sampled.
 
-    ``hausdorff`` the largest distance, either way; ``at`` where on A or B it is; ``rms`` and ``mean`` over the area of
-    both; ``normal_most`` the angle that 99 of 100 samples keep, ``normal_mean`` the mean one. Samples at creases can
-    find the wrong side, and one in a hundred allows for them. ``samples`` how many points were measured.
+    ``hausdorff`` the largest distance, either way, ``share`` that in parts of the diagonal of A's bounds, ``at`` where
+    on A or B it is; ``rms`` and ``mean`` over the area of both; ``normal_most`` the angle that 99 of 100 samples keep,
+    ``normal_mean`` the mean one. Samples at creases can find the wrong side, and one in a hundred allows for them.
+    ``samples`` how many points were measured.
     """
 
     hausdorff: float
+    share: float
     at: tuple[float, float, float]
     rms: float
     mean: float
@@ -108,6 +110,7 @@ def surfaces_apart(a: PolygonMesh, b: PolygonMesh, samples: int = SAMPLES) -> Ap
     far, angle = np.concatenate(distances), np.concatenate(angles)
     return Apart(
         hausdorff=top[0],
+        share=top[0] / float(np.linalg.norm(np.ptp(a.positions, axis=0))),
         at=tuple(float(x) for x in top[1]),  # type: ignore[arg-type]
         rms=float(np.sqrt(np.mean(far**2))),
         mean=float(far.mean()),

@@ -49,7 +49,7 @@ def find_format(path: str | os.PathLike[str], format: str | None, known: tuple[s
     if name == "-":
         raise FormatError(f"the format of standard input or output must be given, one of {listed}")
     if chosen in READ_FORMATS:
-        what = f"'.{chosen}' cannot be used here"
+        what = f"'.{chosen}' {'is read but not written' if known == WRITE_FORMATS else 'cannot be used here'}"
     else:
         what = f"unknown suffix '.{chosen}'" if chosen else "the name has no suffix"
     raise FormatError(f"{name}: {what}; name the format, one of {listed}")

@@ -36,7 +36,7 @@ def test_what_refine_would_do(call, folder):
 def test_options_of_refine_count(call, folder):
     marks = SAMPLES / "pawn-sharp.json"
     text = call("info", SAMPLES / "pawn.obj", "--marks", marks).out.decode()
-    assert "from marks: 56 crease, 1 flat" in text
+    assert "from marks: 56 creases, 1 flat face" in text
     assert "from angle" in call("info", SAMPLES / "pawn.obj", "--sharp-angle", "40").out.decode()
     assert call("info", "cube.obj", "--alpha", "2").code == 2  # what refine would not take
 

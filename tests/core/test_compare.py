@@ -106,6 +106,7 @@ def test_distances_between_spheres():
 
     apart = surfaces_apart(sphere(1.0), sphere(1.1), samples=20_000)
     assert apart.hausdorff == pytest.approx(0.1, rel=0.02)
+    assert apart.share == pytest.approx(0.1 / np.sqrt(12), rel=0.02)  # the first has a diagonal of 2 sqrt(3)
     assert apart.rms == pytest.approx(0.1, rel=0.02)
     assert apart.mean == pytest.approx(0.1, rel=0.02)
     assert apart.normal_most < 1
