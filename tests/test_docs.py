@@ -95,7 +95,7 @@ def test_the_recipes_for_scripts_tell_what_differs(bash, tmp_path: Path) -> None
     for name in ("ring", "vase"):
         shutil.copy(ROOT / "sample_meshes" / f"{name}.obj", tmp_path / "assets")
     text = (DOCS / "checking.md").read_text(encoding="utf-8")
-    goldens, closed = re.findall(r"```bash\n(.*?)```", text, re.DOTALL)
+    _, goldens, closed = re.findall(r"```bash\n(.*?)```", text, re.DOTALL)
     bash(next(block for block in shell_blocks("checking.md") if "--output-dir golden" in block))
     assert bash(goldens) == ""
     ring = tmp_path / "assets" / "ring.obj"
@@ -103,6 +103,15 @@ def test_the_recipes_for_scripts_tell_what_differs(bash, tmp_path: Path) -> None
     (tmp_path / "check.sh").write_text(goldens)
     assert bash("sh check.sh || echo $?") == "golden/ring.ply differs\n1\n"
     assert bash(closed) == "assets/vase.obj is not closed\n"
+
+
+@pytest.mark.skipif(shutil.which("jq") is None, reason="no jq")
+def test_the_report_answers_jq(bash, tmp_path: Path) -> None:
+    recipe = re.findall(r"```bash\n(.*?)```", (DOCS / "checking.md").read_text(encoding="utf-8"), re.DOTALL)[0]
+    shutil.copy(ROOT / "sample_meshes" / "pawn.obj", tmp_path / "part.obj")
+    assert bash(recipe) == "true\n"
+    shutil.copy(ROOT / "sample_meshes" / "l_part.obj", tmp_path / "part.obj")
+    assert bash(f"{recipe.strip()} || echo no") == "false\nno\n"  # it is warned of concave faces
 
 
 def test_the_recipes_for_servers_work_as_written(bash, tmp_path: Path) -> None:
