@@ -9,7 +9,7 @@ those on a crease or a texture seam have one for each side.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,8 +18,6 @@ from curvify.records import field, record, replaced
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from curvify.formats.looks import Looks
 
     Floats = NDArray[np.floating]
     Ints = NDArray[np.integer]
@@ -106,6 +104,20 @@ class Marks:
                 raise MeshError(f"the {what} of a mark must be finite")
         if not (np.isfinite(self.alphas) & (self.alphas > 0)).all():
             raise MeshError("the alpha of a face must be a positive number")
+
+
+@record
+class Looks:
+    """What the materials of a glTF file look like, as its JSON says it (see ``formats.looks``).
+
+    ``materials`` by name, ``textures`` and ``samplers`` as in the file; ``images`` with the bytes of each, None for
+    those that cannot be found.
+    """
+
+    materials: dict[str, dict[str, Any]]
+    textures: list[dict[str, Any]]
+    samplers: list[dict[str, Any]]
+    images: list[tuple[dict[str, Any], bytes | None]]
 
 
 @record

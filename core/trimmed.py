@@ -160,6 +160,7 @@ def trimmed_mesh(pieces: CutCells, patches: Patches, dense: DenseMesh) -> Polygo
         material_files=mesh.material_files,
         face_groups=of_faces(mesh.face_groups),
         group_names=mesh.group_names,
+        looks=mesh.looks,
         position_dtype=kind,
     )
 

@@ -13,21 +13,11 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from curvify.records import record
+from curvify.mesh import Looks
 
 _MAGIC, _JSON, _BINARY = b"glTF", 0x4E4F534A, 0x004E4942
-
-
-@record
-class Looks:
-    """``materials`` by name, ``textures`` and ``samplers`` as in the file; ``images`` with the bytes of each, None for
-    those that cannot be found.
-    """
-
-    materials: dict[str, dict[str, Any]]
-    textures: list[dict[str, Any]]
-    samplers: list[dict[str, Any]]
-    images: list[tuple[dict[str, Any], bytes | None]]
+#: How the images of glTF begin. Nothing else is taken from where a file says that an image is: it may say anything.
+_IMAGES = {b"\x89PNG": "image/png", b"\xff\xd8": "image/jpeg", b"RIFF": "image/webp", b"\xabKTX": "image/ktx2"}
 
 
 def read_looks(data: bytes, format: str, folder: Path) -> tuple[bytes, Looks | None]:
@@ -92,7 +82,7 @@ def _on_first_map(part: Any) -> Any:
 def _image(
     image: dict[str, Any], header: dict[str, Any], binary: bytes, folder: Path
 ) -> tuple[dict[str, Any], bytes | None]:
-    """An image without its place, and its bytes; with its place, and None, where the bytes cannot be had."""
+    """An image without its place, and its bytes; with its place, and None, where no image can be had."""
     if "bufferView" in image:
         view = header["bufferViews"][image["bufferView"]]
         source = header["buffers"][view["buffer"]].get("uri")
@@ -102,11 +92,11 @@ def _image(
             content = content[start : start + view["byteLength"]]
     else:
         content = _fetched(image["uri"], folder)
-    if content is None:
+    kind = next((kind for start, kind in _IMAGES.items() if content and content.startswith(start)), None)
+    if kind is None:
         return image, None
     plain = {key: value for key, value in image.items() if key not in ("uri", "bufferView")}
-    plain.setdefault("mimeType", "image/png" if content.startswith(b"\x89PNG") else "image/jpeg")
-    return plain, content
+    return {"mimeType": kind, **plain}, content
 
 
 def _fetched(uri: str, folder: Path) -> bytes | None:

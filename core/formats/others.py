@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from curvify.arrays import cross, values_of
 from curvify.errors import FormatError
-from curvify.formats.looks import Looks, add_looks, read_looks
+from curvify.formats.looks import add_looks, read_looks
 from curvify.formats.obj_write import round_to
 from curvify.formats.references import referenced_files
 from curvify.formats.wedges import Wedges, split_vertices, wedge_rows
-from curvify.mesh import Floats, Ints, PolygonMesh
+from curvify.mesh import Floats, Ints, Looks, PolygonMesh
 from curvify.records import record
 
 

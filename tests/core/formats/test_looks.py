@@ -14,6 +14,7 @@ from curvify import refine
 from curvify.formats import read_mesh, write_mesh
 from curvify.formats.looks import _joined, _split
 from curvify.formats.references import referenced_files
+from curvify.mask import Mask
 from curvify.refinement import surface
 from surfaces import cube
 
@@ -80,6 +81,12 @@ def test_a_dense_mesh_looks_like_its_coarse_one(painted, tmp_path):
     check_looks(tmp_path / "again.glb")
 
 
+def test_a_trimmed_mesh_looks_the_same(painted, tmp_path):
+    half = Mask(np.array([[1.0, 0.0]]))
+    write_mesh(surface(read_mesh(painted)).trim(half, level=2), tmp_path / "half.glb")
+    check_looks(tmp_path / "half.glb")
+
+
 def test_pictures_beside_a_gltf_file_are_taken_along(painted, tmp_path):
     header, binary = _split(painted.read_bytes())
     (tmp_path / "my paint.jpg").write_bytes(jpeg())
@@ -113,3 +120,13 @@ def test_parts_without_texture_coordinates_leave_the_others_theirs(painted, tmp_
 def test_other_formats_have_no_use_for_looks(painted, tmp_path):
     write_mesh(read_mesh(painted), tmp_path / "made.obj")
     assert read_mesh(tmp_path / "made.obj").material_names == ("paint", "material_1")
+
+
+def test_nothing_but_images_is_taken_along(painted, tmp_path):
+    header, binary = _split(painted.read_bytes())
+    (tmp_path / "secret").write_text("of nobody's business")
+    header["images"] = [{"uri": "secret"}]
+    (tmp_path / "odd.glb").write_bytes(_joined(header, binary))
+    write_mesh(read_mesh(tmp_path / "odd.glb"), tmp_path / "made.glb")
+    made = (tmp_path / "made.glb").read_bytes()
+    assert b"business" not in made and _split(made)[0]["images"] == [{"uri": "secret"}]
