@@ -225,7 +225,7 @@ class DenseMesh:
     Wedge ``w < P`` belongs to vertex ``w``; wedge ``P + r`` repeats vertex ``repeats[r]`` with another
     normal or uv. ``normals (P+R,3)`` unit (zero where a vertex is in no face), ``uvs (P+R,2)`` or None;
     ``face_wedges (Q,s)`` is ``faces`` itself where nothing repeats. ``colors (P,c)`` or None.
-    ``source_faces (Q,)`` is the input face of each cell, ``source_parameters (Q,2)`` the cell's centre in
+    ``source_faces (Q,)`` is the input face of each cell, ``source_parameters (Q,2)`` the cell's center in
     the domain of its patch (specs of the scheme), ``source_patches (Q,)`` the patch itself.
     """
 
@@ -242,6 +242,7 @@ class DenseMesh:
     face_materials: Ints | None = None
     material_names: tuple[str, ...] = ()
     material_files: tuple[str, ...] = ()
+    looks: Looks | None = None
     face_groups: Ints | None = None
     group_names: tuple[str, ...] = ()
 

@@ -91,6 +91,7 @@ class ArraySink:
             face_materials=None if mesh.face_materials is None else mesh.face_materials[self.source_faces],
             material_names=mesh.material_names,
             material_files=mesh.material_files,
+            looks=mesh.looks,
             face_groups=None if mesh.face_groups is None else mesh.face_groups[self.source_faces],
             group_names=mesh.group_names,
         )

@@ -182,7 +182,7 @@ def _sink(out: BinaryIO, format: str, ascii: bool, triangulate: bool, streamed: 
     else:
         collected = ArraySink()
         yield collected
-        mesh = to_polygon_mesh(collected.dense_mesh(), triangulate).with_(looks=collected.layout.mesh.looks)
+        mesh = to_polygon_mesh(collected.dense_mesh(), triangulate)
         write_stream(mesh, out, format)
 
 
@@ -208,6 +208,7 @@ def to_polygon_mesh(dense: DenseMesh, triangulate: bool = False) -> PolygonMesh:
         face_materials=per_face(dense.face_materials),
         material_names=dense.material_names,
         material_files=dense.material_files,
+        looks=dense.looks,
         face_groups=per_face(dense.face_groups),
         group_names=dense.group_names,
         position_dtype=dense.positions.dtype,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from curvify import refine
+from curvify import refine, write
 from curvify.formats import read_mesh, write_mesh
 from curvify.formats.looks import _joined, _split
 from curvify.formats.references import referenced_files
@@ -79,6 +79,8 @@ def test_a_dense_mesh_looks_like_its_coarse_one(painted, tmp_path):
     assert again.corner_uvs is not None and not np.isnan(again.corner_uvs).any()
     write_mesh(again, tmp_path / "again.glb")
     check_looks(tmp_path / "again.glb")
+    write(refine(mesh, level=1), tmp_path / "arrays.glb")
+    check_looks(tmp_path / "arrays.glb")
 
 
 def test_a_trimmed_mesh_looks_the_same(painted, tmp_path):
