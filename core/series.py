@@ -16,8 +16,9 @@ from curvify.schemes.base import Controls
 
 #: Numbers of Chebyshev points, fewest first.
 NODE_COUNTS = (8, 12, 16, 24, 32, 48, 64, 96)
-#: Above LAST points only for so many patches or more: for fewer, tables take longer than the fields at every sample.
-LAST, MANY_PATCHES = 48, 16
+#: Patches for which tables of their own pay. Fewer take those of others that need more points; above LAST points their
+#: fields are evaluated at every sample.
+MANY_PATCHES, LAST = 16, 48
 #: Chebyshev coefficients at the end of a series from which the rest is estimated.
 TAIL = 4
 #: How much to make of the estimate of what a series leaves out.
@@ -87,6 +88,9 @@ def sampled(controls: Controls, count: int, tolerance: float) -> Iterator[tuple[
         fields = group.fields(chebyshev_points(points))
         needed[rows] = points_needed(fields, tolerance) if fields.shape[2] else points
         part = np.flatnonzero(needed[rows] <= points)
-        if len(part):
+        others = needed[(needed > points) & (needed <= LAST)]
+        if len(part) < MANY_PATCHES and len(others):
+            needed[rows[part]] = others.min()
+        elif len(part):
             needed[rows[part]] = 0  # done
             yield rows, group, fields, part

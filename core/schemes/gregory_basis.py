@@ -247,41 +247,34 @@ def _correction(sides: int, points: Floats, domain: Domain, uneven: bool) -> lis
 def _monomial_defects(points: Floats, domain: Domain, degree: int) -> Floats:
     """Jets ``(3,m,S)`` of each monomial minus the plain patch through its own side data."""
     sides = domain.u.shape[1]
-    corners = domain_corners(sides)
     value, gradient, _ = _monomial_derivatives(degree, points)
     defect = np.concatenate([value[None], np.moveaxis(gradient, -1, 0)])
     u, v, w = domain.u, domain.v, domain.w
     both, weights = w + np.roll(w, -1, axis=1), _field_weights(domain)
-    for k in range(sides):
-        ahead = (k + 1) % sides
-        ends = corners[k], corners[ahead], corners[k - 1], corners[(k + 2) % sides]
-        curve, curve_slope, tangent, tangent_slope = _monomial_side(sides, degree, ends, u[0, k])
-        defect -= jet_product(both[:, None, k], jet_compose(curve, curve_slope, u[:, None, k]))
-        defect -= jet_product(weights[:, None, k], jet_compose(tangent, tangent_slope, u[:, None, k]))
-        limits = np.array([0.0, 1.0])
-        curve, _, tangent, slope = (x[:, :, None] for x in _monomial_side(sides, degree, ends, limits))
-        defect += w[:, None, k] * curve[:, 0]
-        defect += jet_product(w[:, k], v[:, k])[:, None] * tangent[:, 0]
-        defect += jet_product(w[:, ahead], u[:, ahead])[:, None] * tangent[:, 1]
-        defect += jet_product(w[:, k], _twist(u[:, k], v[:, k]))[:, None] * slope[:, 0]
-        defect -= jet_product(w[:, ahead], _twist(v[:, ahead], u[:, ahead]))[:, None] * slope[:, 1]
-    return defect
+    curve, curve_slope, tangent, tangent_slope = _monomial_sides(sides, degree, u[0])
+    defect -= jet_product(both[:, None], jet_compose(curve, curve_slope, u[:, None])).sum(axis=2)
+    defect -= jet_product(weights[:, None], jet_compose(tangent, tangent_slope, u[:, None])).sum(axis=2)
+    curve, _, tangent, slope = _monomial_sides(sides, degree, np.tile([0.0, 1.0], (sides, 1)))
+    starts = [w, jet_product(w, v), jet_product(w, _twist(u, v))]
+    ends = [np.roll(jet_product(w, jets), -1, axis=1) for jets in (u, -_twist(v, u))]
+    at_ends = [curve[..., 0], tangent[..., 0], slope[..., 0], tangent[..., 1], slope[..., 1]]
+    return defect + np.einsum("dks,mk->dms", np.concatenate([*starts, *ends], axis=1), np.concatenate(at_ends, axis=1))
 
 
-def _monomial_side(
-    sides: int, degree: int, ends: tuple[Floats, ...], t: Floats
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Monomials along a side at ``t (S,)``: curve, its derivative, cross tangent, its derivative, ``(m,S)``."""
-    start, end, before, after = ends
-    along = end - start
-    place = start + t[:, None] * along
-    across = (1 - t)[:, None] * (before - start) + t[:, None] * (after - end)
+def _monomial_sides(sides: int, degree: int, t: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Monomials along all sides at ``t (n,S)``: curve, its derivative, cross tangent, its derivative, ``(m,n,S)``."""
+    start = domain_corners(sides)
+    end, before, after = np.roll(start, -1, axis=0), np.roll(start, 1, axis=0), np.roll(start, -2, axis=0)
+    along, t = end - start, t[..., None]
+    across = (1 - t) * (before - start)[:, None] + t * (after - end)[:, None]
     turn = (after - end) - (before - start)
-    value, gradient, hessian = _monomial_derivatives(degree, place)
-    speed, speed_slope = side_speed(sides, t)
-    plain = np.einsum("msi,si->ms", gradient, across)
-    slope = np.einsum("msij,si,j->ms", hessian, across, along) + gradient @ turn
-    return value, gradient @ along, speed * plain, speed_slope * plain + speed * slope
+    value, gradient, hessian = _monomial_derivatives(degree, start[:, None] + t * along[:, None])
+    speed, speed_slope = side_speed(sides, t[..., 0])
+    plain = (gradient * across).sum(axis=-1)
+    bend = (hessian * across[..., :, None]).sum(axis=-2)
+    slope = (bend * along[:, None] + gradient * turn[:, None]).sum(axis=-1)
+    slopes = (gradient * along[:, None]).sum(axis=-1)
+    return value, slopes, speed * plain, speed_slope * plain + speed * slope
 
 
 @lru_cache(maxsize=64)
