@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from curvify import __version__
 from curvify.cli.batch_job import DONE, FAILED, NOT_RUN, SKIPPED, Job, Outcome
 from curvify.cli.console import size
+from curvify.cli.options import stamped
 from curvify.cli.report import write_report
 
 HEADINGS = ("file", "", "faces", "size", "seconds", "")
@@ -47,5 +47,4 @@ def write_batch_report(path: str, jobs: list[Job], made: list[Outcome]) -> None:
         {"input": job.name, "output": job.output, **vars(outcome)} for job, outcome in zip(jobs, made, strict=True)
     ]
     options = {name: value for name, value in jobs[0].values.items() if name not in ("input", "output")}
-    report = {"schema": 1, "curvify": __version__, "command": "batch", "options": options, "files": files}
-    write_report(path, report)
+    write_report(path, stamped("batch", {"options": options, "files": files}))

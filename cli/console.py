@@ -39,6 +39,10 @@ class Console:
         if self.verbose and not self.quiet:
             say(f"curvify: {text}")
 
+    def explain_times(self, seconds: dict[str, float]) -> None:
+        """How long each stage took."""
+        self.explain(", ".join(f"{stage.replace('_', ' ')} {took:.3f} s" for stage, took in seconds.items()))
+
     def progress(self, label: str) -> Progress:
         """A progress bar, to be used as a context manager and called with (done, of)."""
         return Progress(label, shown=not self.quiet and sys.stderr.isatty())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, BinaryIO, cast
 
@@ -64,6 +64,20 @@ def check_folder(path: str) -> None:
         raise FormatError(f"{path}: cannot write: it is a folder; give the name of a file")
     if not os.path.isdir(os.path.dirname(path) or "."):
         raise FormatError(f"{path}: cannot write: its folder does not exist; make it first")
+
+
+def check_report(path: str, files: Mapping[str, str]) -> None:
+    """Raise CurvifyError where a report cannot be written beside other ``files``, OUT and inputs by their names, so far
+    as that is known before the work.
+    """
+    if path == STREAM:
+        if files["OUT"] == STREAM:
+            raise OptionError("OUT and --report cannot both be standard output")
+        return
+    check_folder(path)
+    for name, other in files.items():
+        if other != STREAM and os.path.realpath(path) == os.path.realpath(other):
+            raise OptionError(f"{path}: {name} and --report cannot be the same file")
 
 
 def check_suffix(path: str, suffix: str, rule: str) -> None:

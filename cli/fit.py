@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from curvify.cli import options
 from curvify.cli.group import COMMANDS, Command
-
-if TYPE_CHECKING:
-    from curvify.mesh import PolygonMesh
-    from curvify.simplify import Fitted
-    from curvify.simplify.triangles import Triangles
 
 EXAMPLES = (
     (
@@ -36,13 +31,8 @@ EXAMPLES = (
     options.sharp_angle,
     options.sharp_from,
     options.weld,
-    options.input_format,
-    options.output_format,
-    options.precision,
-    options.as_text,
-    options.no_clobber,
+    options.polygons_out,
     options.report,
-    options.messages,
 )
 def command(**given: Any) -> None:
     """Fit a coarse mesh to a dense one, so that its surface comes back to it.
@@ -57,28 +47,21 @@ def command(**given: Any) -> None:
 def fit_files(
     coarse: str,
     dense: str,
-    output: str,
     fit: str,
     sharp_angle: float | None,
     sharp_from: str | None,
     weld: str | None,
-    input_format: str | None,
-    output_format: str | None,
-    precision: str,
-    ascii: bool,
-    no_clobber: bool,
     report: str | None,
     quiet: bool,
     verbose: bool,
+    **ends: Any,
 ) -> None:
     """Read both, fit, write, measure. Raises CurvifyError."""
-    import numpy as np
-
     from curvify.cli import files
     from curvify.cli.console import Console
+    from curvify.cli.polygons import Ends
     from curvify.cli.run import timed
-    from curvify.errors import FormatError, MeshError, OptionError
-    from curvify.formats import write_mesh
+    from curvify.errors import MeshError
     from curvify.schemes.gregory import Options
     from curvify.simplify import Fit, fit_mesh
     from curvify.simplify.triangles import prepare_triangles
@@ -87,21 +70,12 @@ def fit_files(
     console = Console(quiet, verbose)
     given: dict[str, Any] = {"sharp_angle": sharp_angle, "sharp_from": sharp_from, "weld": weld}
     wanted = Fit(fit, options=Options(**{name: value for name, value in given.items() if value is not None}))
-    format = files.check_output(output, output_format, no_clobber)
-    if ascii and format != "ply":
-        raise OptionError(f"--ascii is for PLY; {format} has no such choice")
-    if report == files.STREAM and output == files.STREAM:
-        raise OptionError("OUT and --report cannot both be standard output")
-    if coarse == dense == files.STREAM:
-        raise OptionError("COARSE and DENSE cannot both be standard input")
-    for path in (coarse, dense):
-        files.check_input(path, input_format)
-    if report is not None and report != files.STREAM:
-        files.check_folder(report)
+    there = Ends({"COARSE": coarse, "DENSE": dense}, report=report, **ends)
+    format = there.check()
     seconds: dict[str, float] = {}
-    names = [files.shown_name(path, "stdin") for path in (coarse, dense)]
+    names = there.names
     with timed(seconds, "read"):
-        mesh, scan = (files.read_input(path, input_format) for path in (coarse, dense))
+        mesh, scan = there.read()
         with files.naming(names[1], MeshError):
             triangles, notes = prepare_triangles(scan, weld or "auto")
     with timed(seconds, "fit"), files.naming(names[0], MeshError), console.progress(names[0]) as progress:
@@ -110,48 +84,15 @@ def fit_files(
     warnings += [f"{names[1]}: {text}" for text in [*scan.warnings, *notes]]
     for text in warnings:
         console.warn(text)
-    kind = mesh.position_dtype if precision == "input" else np.dtype(precision)
-    target = files.shown_name(output, "stdout")
-    with timed(seconds, "write"), files.naming(target, FormatError):
-        write_mesh(fitted.mesh, output, format, ascii=ascii, dtype=kind)
+    with timed(seconds, "write"):
+        there.write(fitted.mesh, format, mesh)
     steps = fitted.history[0]
     gain = f"{100 * steps[0]:.4f} % became {100 * steps[-1]:.4f} %"
-    console.explain(f"{target}: a residual of {gain} in {count_of(len(steps) - 1, 'step')}")
-    console.explain(", ".join(f"{stage} {took:.3f} s" for stage, took in seconds.items()))
+    console.explain(f"{there.target}: a residual of {gain} in {count_of(len(steps) - 1, 'step')}")
+    console.explain_times(seconds)
     if report is not None:
-        about = {"coarse": coarse, "dense": dense, "output": output, "options": {**given, "fit": fit}}
-        _write_report(report, mesh, fitted, triangles, about, seconds, warnings)
+        from curvify.cli.report import write_fit_report
 
-
-def _write_report(
-    path: str,
-    mesh: PolygonMesh,
-    fitted: Fitted,
-    dense: Triangles,
-    about: dict[str, Any],
-    seconds: dict[str, float],
-    warnings: list[str],
-) -> None:
-    """Measure both meshes and write it down: distances in shares of the bounding box's diagonal."""
-    from curvify import __version__
-    from curvify.cli.report import SCHEMA, write_report
-    from curvify.cli.run import timed
-    from curvify.simplify.accuracy import accuracy
-
-    with timed(seconds, "measure"):
-        found = {"distances": accuracy(fitted.mesh, dense), "distances_before_fit": accuracy(mesh, dense)}
-    counts = {"faces": mesh.face_count, "vertices": mesh.vertex_count, "triangles": dense.face_count}
-    write_report(
-        path,
-        {
-            "schema": SCHEMA,
-            "curvify": __version__,
-            "command": "fit",
-            **about,
-            "counts": counts,
-            "timings": seconds,
-            **{key: {name: vars(part) for name, part in parts.items()} for key, parts in found.items()},
-            "fit": {"residuals": fitted.history},
-            "warnings": warnings,
-        },
-    )
+        counts = {"faces": mesh.face_count, "vertices": mesh.vertex_count, "triangles": triangles.face_count}
+        about = {"coarse": coarse, "dense": dense, "output": there.output, "options": {**given, "fit": fit}}
+        write_fit_report(report, "fit", {**about, "counts": counts}, mesh, fitted, triangles, seconds, warnings)

@@ -435,9 +435,17 @@ messages = with_options(quiet, verbose)
 #: Where a command that changes polygons writes them, and how.
 polygons_out = with_options(input_format, output_format, precision, as_text, no_clobber, messages)
 
+#: Version of what is told as JSON.
+SCHEMA = 1
+
+
+def stamped(command: str, answer: dict[str, Any]) -> dict[str, Any]:
+    """What a command tells as JSON, with what made it and a version of its form."""
+    return {"schema": SCHEMA, "curvify": __version__, "command": command, **answer}
+
 
 def print_json(command: str, answer: dict[str, Any]) -> None:
-    """Print what a command found as JSON, with what made it and a version of its form."""
+    """Print what a command found as JSON."""
     import json
 
-    click.echo(json.dumps({"schema": 1, "curvify": __version__, "command": command, **answer}, indent=2))
+    click.echo(json.dumps(stamped(command, answer), indent=2))

@@ -44,12 +44,10 @@ def command(**given: Any) -> None:
     repair_file(**given)
 
 
-def repair_file(
-    input: str, output: str, holes: int, weld: str | None, quiet: bool, verbose: bool, **ends: Any
-) -> None:
+def repair_file(input: str, holes: int, weld: str | None, quiet: bool, verbose: bool, **ends: Any) -> None:
     """Read, mend, write. Raises CurvifyError."""
     from curvify.cli.console import Console
-    from curvify.cli.polygons import change_file
+    from curvify.cli.polygons import Ends, change_file
     from curvify.mesh import PolygonMesh
     from curvify.repair import repair_mesh
 
@@ -58,4 +56,4 @@ def repair_file(
         return mended, notes or ["nothing to mend"]
 
     console = Console(quiet, verbose)
-    change_file(mend, console.tell, console, input, output, **ends)
+    change_file(mend, console.tell, console, Ends({"IN": input}, **ends))

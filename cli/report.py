@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from curvify import __version__
+from curvify.cli.options import stamped
 from curvify.mesh import Floats, Ints
 from curvify.polygons import newell_normals
 from curvify.quality import edge_angles
@@ -20,8 +20,10 @@ from curvify.topology import is_closed, signed_volume
 
 if TYPE_CHECKING:
     from curvify.cli.run import Run
+    from curvify.mesh import PolygonMesh
+    from curvify.simplify import Fitted
+    from curvify.simplify.triangles import Triangles
 
-SCHEMA = 1
 #: Edges at which the angle between the faces is measured.
 MOST_EDGES = 20_000
 
@@ -128,10 +130,7 @@ def refine_report(run: Run, layout: DenseLayout, recorder: Recorder) -> dict[str
     ``bytes`` for an output that is not a file or a pipe.
     """
     request, surface = run.request, run.surface
-    return {
-        "schema": SCHEMA,
-        "curvify": __version__,
-        "command": "refine",
+    about = {
         "input": request.input,
         "output": request.output,
         "scheme": request.scheme,
@@ -157,6 +156,35 @@ def refine_report(run: Run, layout: DenseLayout, recorder: Recorder) -> dict[str
         "marks": surface.marks,
         "warnings": run.warnings,
     }
+    return stamped("refine", about)
+
+
+def write_fit_report(
+    path: str,
+    command: str,
+    about: dict[str, Any],
+    start: PolygonMesh,
+    fitted: Fitted,
+    dense: Triangles,
+    seconds: dict[str, float],
+    warnings: list[str],
+) -> None:
+    """Measure a mesh before and after its fit and write that down: distances in shares of the diagonal."""
+    from curvify.cli.run import timed
+    from curvify.simplify.accuracy import accuracy
+
+    with timed(seconds, "measure"):
+        found = {"distances": accuracy(fitted.mesh, dense)}
+        if fitted.history:
+            found["distances_before_fit"] = accuracy(start, dense)
+    answer = {
+        **about,
+        "timings": seconds,
+        **{key: {name: vars(part) for name, part in parts.items()} for key, parts in found.items()},
+        "fit": {"residuals": fitted.history, "max_error": fitted.largest} if fitted.history else None,
+        "warnings": warnings,
+    }
+    write_report(path, stamped(command, answer))
 
 
 def continuity(patches: Patches) -> dict[str, Any]:

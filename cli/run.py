@@ -262,7 +262,9 @@ def check(request: Request) -> tuple[Any, str]:
     files.check_ascii(request.ascii, format)
     files.check_input(request.input, request.input_format)
     if request.report is not None:
-        _check_report(request, request.report)
+        if request.dry_run:
+            raise OptionError("--dry-run measures nothing that --report could tell; leave one of them out")
+        files.check_report(request.report, {"OUT": request.output, "IN": request.input})
     return options, format
 
 
@@ -286,16 +288,6 @@ def flag(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def _check_report(request: Request, report: str) -> None:
-    if request.dry_run:
-        raise OptionError("--dry-run measures nothing that --report could tell; leave one of them out")
-    if report == files.STREAM and request.output == files.STREAM:
-        raise OptionError("OUT and --report cannot both be standard output")
-    if report != files.STREAM:
-        files.check_folder(report)
-        for other, name in ((request.output, "OUT"), (request.input, "IN")):
-            if other != files.STREAM and os.path.realpath(report) == os.path.realpath(other):
-                raise OptionError(f"{report}: {name} and --report cannot be the same file")
 
 
 @contextmanager
@@ -345,7 +337,7 @@ def _refine(run: Run, console: Console) -> None:
     for text in _traffic_notes(run.traffic):
         console.explain(text)
     console.explain(f"{request.target}: {_dense_sizes(run, layout)}" + (f", {size(run.bytes)}" if run.bytes else ""))
-    console.explain(", ".join(f"{stage.replace('_', ' ')} {took:.3f} s" for stage, took in run.seconds.items()))
+    console.explain_times(run.seconds)
     if request.report is not None and recorder is not None:
         from curvify.cli.report import refine_report, write_report
 

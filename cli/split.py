@@ -36,19 +36,15 @@ def command(**given: Any) -> None:
     split_file(**given)
 
 
-def split_file(
-    input: str, output: str, split_rule: str | None, max_sides: int, quiet: bool, verbose: bool, **ends: Any
-) -> None:
+def split_file(input: str, split_rule: str | None, max_sides: int, quiet: bool, verbose: bool, **ends: Any) -> None:
     """Read, split, write. Raises CurvifyError."""
-    from curvify.cli import files
     from curvify.cli.console import Console
-    from curvify.cli.polygons import change_file
+    from curvify.cli.polygons import Ends, change_file
     from curvify.pieces import split_mesh
     from curvify.words import count_of
 
-    console = Console(quiet, verbose)
+    console, there = Console(quiet, verbose), Ends({"IN": input}, **ends)
     mesh, pieces = change_file(
-        lambda mesh: split_mesh(mesh, split_rule or "best", max_sides), console.warn, console, input, output, **ends
+        lambda mesh: split_mesh(mesh, split_rule or "best", max_sides), console.warn, console, there
     )
-    target = files.shown_name(output, "stdout")
-    console.explain(f"{target}: {count_of(mesh.face_count, 'face')} became {pieces.face_count:,}")
+    console.explain(f"{there.target}: {count_of(mesh.face_count, 'face')} became {pieces.face_count:,}")
