@@ -17,6 +17,8 @@ from curvify.mesh import PolygonMesh
 STREAM = "-"
 #: Formats that hold polygons; the others are written as triangles.
 POLYGON_FORMATS = ("obj", "ply", "off")
+#: Formats that hold a polygon mesh with its normals and marks.
+WHOLE_FORMATS = ("obj", "ply")
 
 
 def shown_name(path: str, stream: str) -> str:

@@ -20,6 +20,8 @@ EXAMPLES = (
         "--report fit.json",
     ),
 )
+#: A residual, as a share of the diagonal, that meshes which belong together do not keep.
+FAR = 0.05
 
 
 @click.command(name="fit", cls=Command, examples=EXAMPLES, short_help=COMMANDS["fit"])
@@ -64,6 +66,7 @@ def fit_files(
     from curvify.errors import MeshError
     from curvify.schemes.gregory import Options
     from curvify.simplify import Fit, fit_mesh
+    from curvify.simplify.checks import check_near
     from curvify.simplify.triangles import prepare_triangles
     from curvify.words import count_of
 
@@ -79,14 +82,18 @@ def fit_files(
         with files.naming(names[1], MeshError):
             triangles, notes = prepare_triangles(scan, weld or "auto")
     with timed(seconds, "fit"), files.naming(names[0], MeshError), console.progress(names[0]) as progress:
+        check_near(mesh, triangles)
         fitted = fit_mesh(mesh, triangles, wanted, progress.stage)
+    steps = fitted.history[0]
+    if steps[-1] > FAR:
+        notes.append(f"the fitted surface stays {100 * steps[-1]:.3g} % of the diagonal away from it; are they a pair?")
     warnings = [f"{names[0]}: {text}" for text in mesh.warnings]
     warnings += [f"{names[1]}: {text}" for text in [*scan.warnings, *notes]]
+    warnings += there.losses(format)
     for text in warnings:
         console.warn(text)
     with timed(seconds, "write"):
         there.write(fitted.mesh, format, mesh)
-    steps = fitted.history[0]
     gain = f"{100 * steps[0]:.4f} % became {100 * steps[-1]:.4f} %"
     console.explain(f"{there.target}: a residual of {gain} in {count_of(len(steps) - 1, 'step')}")
     console.explain_times(seconds)

@@ -57,6 +57,14 @@ class Ends:
             files.check_report(self.report, {"OUT": self.output, **self.inputs})
         return format
 
+    def losses(self, format: str) -> list[str]:
+        """What there is to say of a format that cannot hold what refining needs."""
+        if format in files.WHOLE_FORMATS:
+            return []
+        kept = "" if format in files.POLYGON_FORMATS else "polygons, "
+        able = " or ".join(files.WHOLE_FORMATS)
+        return [f"{self.target}: {format} keeps no {kept}normals and creases as refining needs them; write {able}"]
+
     def read(self) -> list[PolygonMesh]:
         """The meshes of the inputs. Raises CurvifyError."""
         return [files.read_input(path, self.format_of(path)) for path in self.inputs.values()]

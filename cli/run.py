@@ -288,8 +288,6 @@ def flag(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-
-
 @contextmanager
 def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     """Note how long a stage took."""

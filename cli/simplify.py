@@ -81,7 +81,7 @@ def simplify_file(
     (name,) = there.names
     with timed(seconds, "simplify"), files.naming(name, MeshError), console.progress(name) as progress:
         result = simplify_and_fit(mesh, chosen, wanted, progress.stage)
-    warnings = [f"{name}: {text}" for text in result.warnings]
+    warnings = [*(f"{name}: {text}" for text in result.warnings), *there.losses(format)]
     for text in warnings:
         console.warn(text)
     with timed(seconds, "write"):

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from curvify.arrays import by_component, cross, take_rows
+from curvify.errors import MeshError
 from curvify.mesh import Floats, Ints
 from curvify.normals import length
 from curvify.records import record
@@ -26,10 +27,12 @@ class Nearest:
 
     @classmethod
     def of(cls, positions: Floats, triangles: Ints) -> Nearest:
-        """The tree of a mesh. Triangles ``(F,3)`` without area count for nothing; at least one must have some."""
+        """The tree of a mesh. Triangles ``(F,3)`` without area count for nothing; MeshError where none has any."""
         import igl
 
         sized = np.flatnonzero(double_areas(positions, triangles) > 0)
+        if not len(sized):
+            raise MeshError("no face has an area; there is no surface to measure from")
         corners = np.ascontiguousarray(positions, dtype=np.float64)
         kept = np.ascontiguousarray(triangles[sized], dtype=np.int64)
         tree = igl.AABB()
@@ -46,7 +49,7 @@ class Nearest:
 
 def nearest_points(points: Floats, positions: Floats, triangles: Ints) -> tuple[Floats, Ints, Floats]:
     """Distance ``(n,)`` of points ``(n,3)`` from a triangle mesh, the nearest triangle ``(n,)`` and the place there
-    ``(n,3)``. Triangles ``(F,3)`` without area count for nothing; at least one must have some.
+    ``(n,3)``. Triangles ``(F,3)`` without area count for nothing. Raises MeshError where none has any.
     """
     return Nearest.of(positions, triangles)(points)
 

@@ -7,9 +7,14 @@ import numpy as np
 from curvify.arrays import distinct
 from curvify.errors import MeshError
 from curvify.mesh import Ints, PolygonMesh
+from curvify.nearest import nearest_points
+from curvify.polygons import newell_normals
 from curvify.simplify.polygons import Polygons, pillows, shapes_of
 from curvify.simplify.triangles import Triangles
 from curvify.topology import Topology, build_topology, fans
+
+#: Mean distance, as a share of the smaller diagonal, from which on a mesh does not lie near another.
+APART = 0.5
 
 
 def check_polygons(dense: Triangles, polygons: Polygons) -> None:
@@ -56,6 +61,22 @@ def _is_triangle_of(dense: Triangles, polygons: Polygons, topology: Topology) ->
     single = count[polygons.regions] == 3
     whole = np.bincount(topology.faces, single & (polygons.sizes == 1), polygons.count)
     return (whole == 3) & (polygons.sides == 3)
+
+
+def check_near(mesh: PolygonMesh, dense: Triangles) -> None:
+    """Raise MeshError unless the faces of a coarse mesh have an area and lie somewhere near the dense one."""
+    if mesh.face_count and not newell_normals(mesh.positions, mesh.face_offsets, mesh.face_vertices).any():
+        raise MeshError("no face of the mesh has an area; there is nothing to fit")
+    places = mesh.positions[distinct(mesh.face_vertices)[0]]
+    if not len(places):
+        return  # of that the fit has more to say
+    away = float(nearest_points(places, dense.positions, dense.vertices)[0].mean())
+    size = min(float(np.linalg.norm(np.ptp(places, axis=0))), dense.diagonal)
+    if away > APART * size:
+        raise MeshError(
+            f"it does not lie near the dense mesh: the mean distance of its vertices is {away:.3g}, and the smaller of "
+            f"the two meshes is {size:.3g} large; both must have the same units and place"
+        )
 
 
 def check_mesh_like(start: PolygonMesh, mesh: PolygonMesh) -> None:

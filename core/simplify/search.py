@@ -34,8 +34,11 @@ PIECES, LOOSER, LOOSEST = 1.75, 1.5, 4
 STIFF = 0.98
 #: The least factor on the tolerance, where the number cannot be reached otherwise.
 CLOSEST = 0.05
-#: Fewer regions must bring at least this much: below lies what topology and creases ask for.
+#: Fewer regions must bring at least this much: below lies what topology and creases ask for. So must merging where that
+#: does not reach the number wanted: polygons suffer from it.
 FLOOR = 0.9
+#: The least share that the loss of polygons must have in the loss of regions for these to be worth it.
+WORTH = 0.2
 #: The count asked for is met within this share.
 CLOSE = 0.05
 #: How often regions of polygons that cross are halved.
@@ -79,10 +82,21 @@ class Search:
             found = attempts[-1].against(self.wanted)
             if self.wanted <= found <= SURPLUS * self.wanted:
                 break
+            regions = self.count
             if not self._adjust(found, int(attempts[-1].labels.max()) + 1):
                 break
-            attempts.append(self._attempt(len(attempts)))
+            attempt = self._attempt(len(attempts))
+            if self._hardly_fewer(found, regions, attempt.against(self.wanted)):
+                break
+            attempts.append(attempt)
         return min(attempts, key=lambda one: _misses(one.against(self.wanted), self.wanted))
+
+    def _hardly_fewer(self, before: int, regions: int, after: int) -> bool:
+        """Whether there are hardly fewer polygons ``after`` than ``before``, when there were so many ``regions``, and
+        still too many: though regions are fewer, which makes polygons worse.
+        """
+        lost = 1 - self.count / regions
+        return after > self.wanted and lost > 0 and 1 - after / before < WORTH * lost
 
     def _attempt(self, number: int) -> Attempt:
         self.tell("regions", 0.9 * (1 - 0.5**number))
@@ -154,7 +168,9 @@ def _found(dense: Triangles, metric: Metric, options: Options, tell: Progress) -
     best = Search(dense, metric, options, options.faces, tell).run()
     if best.against(options.faces) < options.faces:
         best = _fill(dense, metric, best, options, options.faces)
-    return reduced(dense, best, options.faces)
+    fewer = reduced(dense, best, options.faces)
+    worth = fewer.count <= max((1 + CLOSE) * options.faces, FLOOR * best.count)
+    return fewer if worth else best
 
 
 def _untangled(dense: Triangles, metric: Metric, attempt: Attempt, options: Options) -> Attempt:

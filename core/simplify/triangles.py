@@ -87,7 +87,7 @@ class Triangles:
 def prepare_triangles(mesh: PolygonMesh, weld: str = "auto") -> tuple[Triangles, list[str]]:
     """The triangles of a polygon mesh, cut open to a manifold, and a sentence for whatever was changed.
 
-    ``weld`` as for refining. Raises MeshError where no triangle is left.
+    ``weld`` as for refining. Raises MeshError where no triangle with an area is left.
     """
     mesh.validate()
     notes: list[str] = []
@@ -105,7 +105,10 @@ def prepare_triangles(mesh: PolygonMesh, weld: str = "auto") -> tuple[Triangles,
     triangles = _without_doubles(triangles, notes)
     if not len(triangles):
         raise MeshError("the mesh has no face with 3 distinct corners; there is nothing to simplify")
-    return _cut(positions, triangles, notes), notes
+    cut = _cut(positions, triangles, notes)
+    if not cut.areas.any():
+        raise MeshError("no face of the mesh has an area; there is nothing to simplify")
+    return cut, notes
 
 
 def _without_doubles(triangles: Ints, notes: list[str]) -> Ints:

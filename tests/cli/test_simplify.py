@@ -86,6 +86,7 @@ def test_compactness_proxies_and_angle_have_their_say(call, folder, torus):
         (["few.obj", "--faces", 9, "--max-error", "0"], "closer than 0"),
         (["few.obj", "--faces", 9, "--ascii"], "--ascii is for PLY"),
         (["few.xyz", "--faces", 9], "unknown suffix"),
+        (["few.obj", "--faces", 9, "--report", "few.obj"], "OUT and --report cannot be the same"),
         (["-", "--faces", 9, "--output-format", "ply", "--report", "-"], "cannot both be standard output"),
     ],
 )
@@ -95,6 +96,21 @@ def test_errors(call, folder, arguments, says):
     assert says in result.err
     assert len(result.err.splitlines()) == 1
     assert not (folder / "few.obj").exists()
+
+
+def test_faces_without_area_are_refused(call, folder):
+    (folder / "level.obj").write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nf 1 2 3\nf 2 3 4\n")
+    result = call("simplify", "level.obj", "few.obj", "--faces", 1)
+    assert (result.code, result.out) == (2, b"")
+    assert "level.obj: no face of the mesh has an area" in result.err
+
+
+@pytest.mark.parametrize(("name", "lost"), [("few.stl", "polygons, normals and creases"), ("few.off", "normals and")])
+def test_formats_that_cannot_hold_the_result_are_a_warning(call, folder, name, lost):
+    result = call("simplify", "cube.obj", name, "--faces", 6, "--fit", "none")
+    assert result.code == 0
+    assert f"{name}: {name[-3:]} keeps no {lost}" in result.err
+    assert (folder / name).exists()
 
 
 def test_more_faces_than_there_are_is_a_warning(call):

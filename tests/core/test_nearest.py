@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from curvify.errors import MeshError
 from curvify.nearest import nearest_points, places_on, spread
 
 SQUARE = np.array([[0, 0, 0], [3, 0, 0], [3, 1, 0], [0, 1, 0]], dtype=float), np.array([[0, 1, 2], [0, 2, 3]])
@@ -30,6 +31,11 @@ def test_triangles_without_area_count_for_nothing():
     found = nearest_points(np.array([[1.0, 0.1, 5.0], [3.0, 1.0, 0.0]]), positions, needles)
     assert found[0] == pytest.approx([5, 0])
     assert found[1][0] == 2
+
+
+def test_a_mesh_without_area_is_refused():
+    with pytest.raises(MeshError, match="no face has an area"):
+        nearest_points(SQUARE[0], SQUARE[0], np.array([[0, 1, 1], [2, 2, 2]]))
 
 
 def test_samples_are_in_proportion_to_area_and_on_the_surface():
