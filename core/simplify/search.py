@@ -93,10 +93,10 @@ class Search:
 
     def _hardly_fewer(self, before: int, regions: int, after: int) -> bool:
         """Whether there are hardly fewer polygons ``after`` than ``before``, when there were so many ``regions``, and
-        still too many: though regions are fewer, which makes polygons worse.
+        there never were too few: though regions are fewer, which makes polygons worse.
         """
         lost = 1 - self.count / regions
-        return after > self.wanted and lost > 0 and 1 - after / before < WORTH * lost
+        return self.low == 0 and after > self.wanted and lost > 0 and 1 - after / before < WORTH * lost
 
     def _attempt(self, number: int) -> Attempt:
         self.tell("regions", 0.9 * (1 - 0.5**number))
@@ -145,32 +145,32 @@ def find_polygons(
     dense: Triangles, metric: Metric, options: Options, notes: list[str], tell: Progress
 ) -> Attempt:
     """Polygons as the options ask for; where their number cannot be had, that is said in ``notes``."""
-    attempt = _found(dense, metric, options, tell)
+    attempt, least = _found(dense, metric, options, tell)
     tell("crossings", 0.92)
     attempt = _untangled(dense, metric, attempt, options)
     wanted = options.faces
     if wanted is not None and attempt.count > (1 + CLOSE) * wanted:
-        notes.append(
-            f"{count_of(wanted, 'face')} cannot hold this mesh's topology and creases; "
-            f"{attempt.count:,} are the fewest found"
-        )
+        why = "cannot hold this mesh's topology and creases" if least else "were not met"
+        most = "are the fewest found" if least else "come nearest"
+        notes.append(f"{count_of(wanted, 'face')} {why}; {attempt.count:,} {most}")
     elif wanted is not None and attempt.count < (1 - CLOSE) * wanted:
         notes.append(f"{count_of(attempt.count, 'face')} hold everything; more would add nothing")
     return attempt
 
 
-def _found(dense: Triangles, metric: Metric, options: Options, tell: Progress) -> Attempt:
-    """Polygons as the options ask for, whether they cross or not."""
+def _found(dense: Triangles, metric: Metric, options: Options, tell: Progress) -> tuple[Attempt, bool]:
+    """Polygons as the options ask for, whether they cross or not; and whether no attempt had too few of them."""
     if options.faces is None:
         labels = cluster(dense, metric, options.proxies or 1, face_components(dense))
         labels = compacted(dense, metric, labels, options)
-        return polygons_of(dense, metric, labels, options, int(labels.max()) + 1)
-    best = Search(dense, metric, options, options.faces, tell).run()
+        return polygons_of(dense, metric, labels, options, int(labels.max()) + 1), True
+    search = Search(dense, metric, options, options.faces, tell)
+    best = search.run()
     if best.against(options.faces) < options.faces:
         best = _fill(dense, metric, best, options, options.faces)
     fewer = reduced(dense, best, options.faces)
     worth = fewer.count <= max((1 + CLOSE) * options.faces, FLOOR * best.count)
-    return fewer if worth else best
+    return fewer if worth else best, search.low == 0
 
 
 def _untangled(dense: Triangles, metric: Metric, attempt: Attempt, options: Options) -> Attempt:
