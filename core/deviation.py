@@ -13,11 +13,11 @@ import numpy as np
 
 from curvify.arrays import cross
 from curvify.errors import MeshError
-from curvify.formats.others import triangulate
 from curvify.mesh import Floats, Ints, PolygonMesh
 from curvify.nearest import Nearest, corners_of, double_areas, places_on, spread
 from curvify.normals import degrees_between
 from curvify.palette import to_shown, value_colors
+from curvify.triangulation import triangle_corners
 
 SAMPLES = 100_000
 
@@ -51,7 +51,7 @@ class Triangles:
 
 def as_triangles(mesh: PolygonMesh) -> Triangles:
     """The triangles of a mesh that have an area. Raises MeshError where there are none."""
-    corners = triangulate(mesh)
+    corners = triangle_corners(mesh)
     vertices = mesh.face_vertices[corners]
     sized = double_areas(mesh.positions, vertices) > 0
     if not sized.any():

@@ -1,9 +1,13 @@
-"""Polygons into triangles by diagonals, for the schemes that know triangles only.
+"""Polygons into triangles by diagonals, for schemes, files and searches that know triangles only.
 
 The rule depends on a polygon's positions and vertex ids, not on the corner that is listed first: quads are cut along
 their shorter diagonal, or at their reflex corner; larger polygons by ear clipping (mapbox_earcut) in the plane of their
-area vector. The pieces come as a ``convex.Split``, so that triangles keep their source faces and corners as the convex
-pieces of the other schemes do.
+area vector. Polygons that this would cut along an edge of the mesh or another's diagonal, as beside a vertex of two
+edges, are cut by the splitter of convex polygons, which avoids that: an edge must not come to have four sides. The
+pieces come as a ``convex.Split``, so that triangles keep their source faces and corners as the convex pieces do.
+
+Two places have reasons of their own: `simplify` begins with the well-shaped triangles of the splitter, which takes
+longer; pictures (`gpu.triangles`) show quads halved at one corner, fast, and nobody counts the edges of those.
 """
 
 from __future__ import annotations
@@ -11,8 +15,8 @@ from __future__ import annotations
 import numpy as np
 
 from curvify.arrays import values_of
-from curvify.convex import Split, cut_along
-from curvify.mesh import Bools, Floats, Ints
+from curvify.convex import Split, cut_along, split_polygons
+from curvify.mesh import Bools, Floats, Ints, PolygonMesh
 from curvify.polygons import cross_rows, dot_rows, edge_keys, is_in, judge, lay_flat, next_corners
 
 #: Diagonals whose squared lengths agree to this share are equally long.
@@ -49,7 +53,35 @@ def triangulate_polygons(
         pairs.append(np.take_along_axis(corners.T[:, None], ends, axis=2).reshape(-1, 2))
         fanned.append(failed)
     reasons = np.zeros(len(sizes), dtype=np.uint8)
-    return cut_along(offsets, vertices, np.concatenate(pairs), reasons), np.concatenate(fanned)
+    cuts = _without_doubles(positions, offsets, vertices, np.concatenate(pairs))
+    return cut_along(offsets, vertices, cuts, reasons), np.concatenate(fanned)
+
+
+def triangle_corners(mesh: PolygonMesh) -> Ints:
+    """Corners ``(T,3)`` of triangles that cover the faces, in face order: n-2 for a face with n corners."""
+    split, _ = triangulate_polygons(mesh.positions, mesh.face_offsets, mesh.face_vertices)
+    whole = np.repeat(np.diff(split.face_offsets) == 3, np.diff(split.face_offsets))
+    return split.source_corners[whole].reshape(-1, 3)
+
+
+def _without_doubles(positions: Floats, offsets: Ints, vertices: Ints, pairs: Ints) -> Ints:
+    """The diagonals ``pairs (D,2)`` of corners, those of faces replaced that would run along an edge or another one."""
+    if not len(pairs):
+        return pairs
+    keys = edge_keys(*vertices[pairs].T)
+    order = np.argsort(keys, kind="stable")
+    double = is_in(keys, np.sort(edge_keys(vertices, vertices[next_corners(offsets)])))
+    double[order[1:]] |= keys[order[1:]] == keys[order[:-1]]
+    owner = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))[pairs[:, 0]]
+    kept = ~np.isin(owner, owner[double])
+    if kept.all():
+        return pairs
+    first = cut_along(offsets, vertices, pairs[kept], np.zeros(len(offsets) - 1, dtype=np.uint8))
+    rest = split_polygons(positions, first.face_offsets, first.face_vertices, max_sides=3)
+    here, ends = np.flatnonzero(rest.diagonals >= 0), next_corners(rest.face_offsets)
+    here = here[np.argsort(rest.diagonals[here], kind="stable")][::2]  # each has two sides
+    added = first.source_corners[rest.source_corners[np.stack([here, ends[here]], axis=1)]]
+    return np.concatenate([pairs[kept], added])
 
 
 def _quad_diagonals(points: Floats, ids: Ints, offsets: Ints, vertices: Ints) -> Ints:

@@ -10,7 +10,6 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from curvify.arrays import cross, values_of
 from curvify.errors import FormatError
 from curvify.formats.looks import add_looks, read_looks
 from curvify.formats.obj_write import round_to
@@ -18,6 +17,7 @@ from curvify.formats.references import referenced_files
 from curvify.formats.wedges import Wedges, split_vertices, wedge_rows
 from curvify.mesh import Floats, Ints, Looks, PolygonMesh
 from curvify.records import record
+from curvify.triangulation import triangle_corners
 
 
 @record
@@ -226,13 +226,13 @@ def write_other(mesh: PolygonMesh, out: BinaryIO, format: str) -> None:
 
 def _shape(mesh: PolygonMesh, trimesh: Any) -> Any:
     """The triangles alone."""
-    return trimesh.Trimesh(mesh.positions, mesh.face_vertices[triangulate(mesh)], process=False)
+    return trimesh.Trimesh(mesh.positions, mesh.face_vertices[triangle_corners(mesh)], process=False)
 
 
 def _scene(mesh: PolygonMesh, trimesh: Any) -> Any:
     """The mesh with its attributes, one part for each material."""
     wedges = split_vertices(mesh, np.dtype(np.float32))
-    corners = triangulate(mesh)
+    corners = triangle_corners(mesh)
     triangles = wedges.face_wedges[corners]
     materials = np.full(len(corners), -1)
     if mesh.face_materials is not None:
@@ -280,51 +280,3 @@ def _byte_colors(colors: NDArray[np.generic]) -> NDArray[np.uint8]:
     if colors.dtype.kind != "f":
         return colors.astype(np.uint8)
     return np.rint(np.clip(colors.astype(np.float64), 0, 1) * 255).astype(np.uint8)
-
-
-def triangulate(mesh: PolygonMesh) -> Ints:
-    """Corners ``(T,3)`` of triangles that cover the faces, in face order: n-2 for a face with n corners."""
-    sizes, starts = mesh.face_sizes, mesh.face_offsets[:-1]
-    offsets = np.concatenate([[0], np.cumsum(np.maximum(sizes - 2, 0))])
-    out = np.empty((int(offsets[-1]), 3), dtype=np.int64)
-    for size in values_of(sizes[sizes >= 3]):
-        faces = np.flatnonzero(sizes == size)
-        corners = starts[faces, None] + np.arange(size)
-        local = _local_triangles(mesh.positions[mesh.face_vertices[corners]])
-        rows = offsets[faces, None] + np.arange(size - 2)
-        out[rows] = starts[faces, None, None] + local
-    return out
-
-
-def _local_triangles(points: Floats) -> Ints:
-    """Triangles ``(F,n-2,3)`` of polygons ``(F,n,3)``: fans where those do not fold, ears elsewhere."""
-    count, size, _ = points.shape
-    steps = np.arange(1, size - 1)
-    fan = np.stack([np.zeros_like(steps), steps, steps + 1], axis=1)
-    local = np.tile(fan, (count, 1, 1))
-    if size == 3:
-        return local
-    area = cross(points, np.roll(points, -1, axis=1)).sum(axis=1)
-    a, b, c = (points[:, fan[:, k]] for k in range(3))
-    facing = np.einsum("fti,fi->ft", cross(b - a, c - a), area)
-    for face in np.flatnonzero((facing <= 0).any(axis=1)).tolist():
-        ears = _ears(points[face], area[face])
-        if ears is not None:
-            local[face] = ears
-    return local
-
-
-def _ears(points: Floats, normal: Floats) -> Ints | None:
-    """Triangles of one polygon by ear clipping in its plane; None where that does not cover it."""
-    import mapbox_earcut
-
-    drop = int(np.argmax(np.abs(normal)))
-    flat = np.delete(points, drop, axis=1).astype(np.float64)
-    indices = mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], dtype=np.uint32))
-    triangles = np.asarray(indices, dtype=np.int64).reshape(-1, 3)
-    if len(triangles) != len(points) - 2:
-        return None
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    turned = cross(b - a, c - a) @ normal < 0
-    triangles[turned] = triangles[turned][:, ::-1]
-    return triangles

@@ -16,8 +16,8 @@ import pytest
 from curvify.errors import FormatError
 from curvify.formats import atomic_file, read_mesh, write_mesh
 from curvify.formats.off import read_off
-from curvify.formats.others import triangulate
 from curvify.mesh import PolygonMesh
+from curvify.triangulation import triangle_corners
 
 CUBE = PolygonMesh.from_faces(
     [[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)],
@@ -193,7 +193,7 @@ def test_glb_keeps_normals_and_uvs(tmp_path: Path) -> None:
     mesh = CUBE.with_(corner_normals=normals, corner_uvs=np.tile([[0, 0], [0, 1], [1, 1], [1.0, 0]], (6, 1)))
     write_mesh(mesh, tmp_path / "a.glb")
     again = read_mesh(tmp_path / "a.glb")
-    corners = triangulate(mesh).reshape(-1)
+    corners = triangle_corners(mesh).reshape(-1)
     np.testing.assert_allclose(again.corner_normals, normals[corners], atol=1e-6)
     np.testing.assert_allclose(again.corner_uvs, mesh.corner_uvs[corners], atol=1e-6)
 
@@ -210,7 +210,7 @@ def test_concave_polygons_are_cut_without_folding() -> None:
     points = [[0, 0, 0], [4, 0, 0], [4, 4, 0], [2, 1, 0], [0, 4, 0]]
     for shift in range(5):
         mesh = PolygonMesh.from_faces(points, [[(i + shift) % 5 for i in range(5)]])
-        a, b, c = (mesh.positions[mesh.face_vertices[triangulate(mesh)[:, k]]] for k in range(3))
+        a, b, c = (mesh.positions[mesh.face_vertices[triangle_corners(mesh)[:, k]]] for k in range(3))
         areas = np.cross(b - a, c - a)[:, 2] / 2
         assert (areas > 0).all()
         assert areas.sum() == pytest.approx(10)
