@@ -169,8 +169,9 @@ def _found(dense: Triangles, metric: Metric, options: Options, tell: Progress) -
     if best.against(options.faces) < options.faces:
         best = _fill(dense, metric, best, options, options.faces)
     fewer = reduced(dense, best, options.faces)
-    worth = fewer.count <= max((1 + CLOSE) * options.faces, FLOOR * best.count)
-    return fewer if worth else best, search.low == 0
+    least = search.low == 0
+    worth = not least or fewer.count <= max((1 + CLOSE) * options.faces, FLOOR * best.count)
+    return fewer if worth else best, least
 
 
 def _untangled(dense: Triangles, metric: Metric, attempt: Attempt, options: Options) -> Attempt:
