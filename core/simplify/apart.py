@@ -16,10 +16,12 @@ from curvify.edges import edge_curves, normal_fields, smooth_tangents
 from curvify.evaluate import PARALLEL, exact_values
 from curvify.marks import ResolvedMarks
 from curvify.mesh import Bools, Floats, Ints
+from curvify.normals import unit
 from curvify.records import record, replaced
 from curvify.sampling import edge_abscissae, kite_sampling
-from curvify.schemes.base import Basis, bernstein_basis
-from curvify.schemes.cross_tangents import Sides
+from curvify.schemes.base import Basis, bernstein_basis, bernstein_slopes
+from curvify.schemes.cross_tangents import Sides, start_share
+from curvify.schemes.folds import PLACES
 from curvify.schemes.gregory import (
     CrossTangent,
     GregoryControls,
@@ -31,6 +33,8 @@ from curvify.schemes.gregory import (
 from curvify.schemes.gregory_basis import gregory_basis
 from curvify.sectors import EdgeEnds, end_tangents, is_tilted, upright_normals
 
+#: Bernstein polynomials of sides and their derivatives where `refine` looks for folds.
+NORMAL_AT, SPEED_AT = bernstein_basis(3, PLACES), bernstein_slopes(3, PLACES)
 #: The level at which patches are sampled: 6 n + 1 points each.
 LEVEL = 2
 
@@ -71,7 +75,7 @@ class Apart:
         return replaced(self, **{name: getattr(self, name)[rows] for name in _PER_PATCH})
 
     def samples(self, points: Floats, normals: Floats, others: Floats) -> tuple[Floats, Floats]:
-        """Samples ``(f,6n+1,3)`` of the patches, and the sine ``(f,n)`` with which each corner opens.
+        """Samples ``(f,6n+1,3)`` of the patches, and the sines ``(f,n,3)`` with which they open.
 
         ``points`` and ``normals (f,n,3)`` of the corners, ``others (f,n,2,3)`` the normals beyond the sides. Samples
         are those of level 2: corners, the inner points of sides, inner points.
@@ -88,10 +92,15 @@ class Apart:
         across = cross(by_xi, by_eta, axis=0)
         parallel = (across**2).sum(axis=0) <= PARALLEL * (by_xi**2).sum(axis=0) * (by_eta**2).sum(axis=0)
         inside = unit_rows(np.where(parallel, 0.0, across))
-        along = unit_rows(_on_sides(shape.fields))
+        along = unit_rows(_on_sides(shape.sides.fields))
         corner = leading(shape.normals)
         found = np.concatenate([corner, along.reshape(*along.shape[:2], -1), inside], axis=2)
         return _join(shape, values), np.moveaxis(found, 0, -1), shape.sines, shape.adjusted
+
+    def openings(self, points: Floats, normals: Floats, others: Floats) -> tuple[Floats, Bools]:
+        """The sines and the corners that cannot keep their normals, without samples."""
+        shape = self._shape(points, normals, others)
+        return shape.sines, shape.adjusted
 
     @property
     def _basis(self) -> Basis:
@@ -127,21 +136,21 @@ class Apart:
         if len(refit):
             upright = upright.copy()
             upright[refit] = upright_normals(upright[refit], out[refit], back[refit])
-        sines = np.einsum("ci,ci->c", cross(out, back), upright).reshape(count, n)
+        corner_sines = np.einsum("ci,ci->c", cross(out, back), upright).reshape(count, n)
         curves = edge_curves(start, end, tangents[:, 0], tangents[:, 1], "circle")
         fields = normal_fields(curves, upright[edges[:, 0]], upright[edges[:, 1]], bending)
+        sides = sides_of(leading(points), _per_side(curves, n), _per_side(fields, n))
         return Shape(
             corner=leading(points),
             normals=upright.reshape(count, n, 3),
-            curves=_per_side(curves, n),
-            fields=_per_side(fields, n),
-            sines=sines,
+            sides=sides,
+            sines=np.stack([corner_sines, side_sines(sides, self.kind), turn_sines(points)], axis=2),
             adjusted=tilted.reshape(count, n) & ~self.stiff,
         )
 
     def _controls(self, shape: Shape) -> GregoryControls:
         """The patches between their sides."""
-        sides: Sides = sides_of(shape.corner, shape.curves, shape.fields)
+        sides = shape.sides
         tangent: CrossTangent
         target: Floats | None
         if self.kind == "precise":
@@ -157,16 +166,38 @@ _PER_PATCH = tuple(name for name in Apart.__annotations__ if name not in ("kind"
 
 @record
 class Shape:
-    """What patches are made of: ``corner (3,f,n)`` points, ``normals (f,n,3)``, ``curves`` and ``fields (3,f,n,4)`` of
-    the sides; ``sines (f,n)`` of the corners, and those ``adjusted (f,n)`` that lost their normals.
+    """What patches are made of: ``corner (3,f,n)`` points, ``normals (f,n,3)``, ``sides``; ``sines (f,n,3)`` with which
+    they open at the corners and along the sides, and polygons turn; corners ``adjusted (f,n)`` that lost their normals.
     """
 
     corner: Floats
     normals: Floats
-    curves: Floats
-    fields: Floats
+    sides: Sides
     sines: Floats
     adjusted: Bools
+
+
+def side_sines(sides: Sides, kind: str) -> Floats:
+    """The least sine ``(f,n)`` between each side and the blend of the tangents across it, seen along its normals.
+
+    Where it is not above 0, `refine` cuts the polygon: see `schemes.folds.blended_inward`.
+    """
+    normal, speed = sides.fields @ NORMAL_AT, sides.curves @ SPEED_AT
+    inward = cross(normal, speed, axis=0)
+    h = start_share(kind, PLACES)
+    tangent = sides.start[..., None] * h + sides.end[..., None] * (1 - h)
+    square = (inward**2).sum(axis=0) * (tangent**2).sum(axis=0)
+    sines = (inward * tangent).sum(axis=0) / np.sqrt(np.maximum(square, 1e-300))
+    return np.asarray(sines.min(axis=-1))
+
+
+def turn_sines(points: Floats) -> Floats:
+    """The sine ``(f,n)`` by which polygons ``(f,n,3)`` turn at each corner, seen along their area vectors."""
+    leave, arrive = np.roll(points, -1, axis=1) - points, points - np.roll(points, 1, axis=1)
+    normal = unit(cross(points, np.roll(points, -1, axis=1)).sum(axis=1))
+    square = (leave**2).sum(axis=2) * (arrive**2).sum(axis=2)
+    turn = np.einsum("fki,fi->fk", cross(arrive, leave), normal)
+    return np.asarray(turn / np.sqrt(np.maximum(square, 1e-300)))
 
 
 def _per_side(points: Floats, n: int) -> Floats:
@@ -181,7 +212,7 @@ def _on_sides(points: Floats) -> Floats:
 
 def _join(shape: Shape, inside: Floats) -> Floats:
     """Corners, points of sides and inner points ``(3,f,m)`` as samples ``(f,6n+1,3)``."""
-    along = _on_sides(shape.curves)
+    along = _on_sides(shape.sides.curves)
     return np.moveaxis(np.concatenate([shape.corner, along.reshape(*along.shape[:2], -1), inside], axis=2), 0, -1)
 
 

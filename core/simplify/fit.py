@@ -97,22 +97,30 @@ class _Fitting:
             return Fitted(self._solved(mesh, STEPS), self.history)
         mesh = self._as_refined(self._whole(self._solved(mesh, STEPS)))
         if self.fit.max_error is None:
-            mesh = self._added(mesh, face_errors(mesh, self.dense, self.fit.options), 0.0)
-            return Fitted(relax_folded(self._whole(self._solved(mesh, LAST_STEPS))), self.history)
+            mesh = self._added(mesh, self._errors(mesh), 0.0)
+            return Fitted(self._finished(mesh), self.history)
         return self._held(mesh, self.fit.max_error * self.dense.diagonal)
 
     def _held(self, mesh: PolygonMesh, limit: float) -> Fitted:
         """Add polygons and fit on until the largest error is below the limit or the budget is spent: the best mesh."""
         found = []
         for _ in range(ROUNDS):
-            errors = face_errors(mesh, self.dense, self.fit.options)
+            errors = self._errors(mesh)
             found.append((float(errors.max()), mesh))
             more = self._added(mesh, errors, limit)
             if errors.max() <= limit or more is mesh:
                 break
-            mesh = relax_folded(self._whole(self._solved(more, LAST_STEPS)))
+            mesh = self._finished(more)
         largest, mesh = min(found, key=lambda pair: pair[0])
         return Fitted(mesh, self.history, largest / self.dense.diagonal)
+
+    def _finished(self, mesh: PolygonMesh) -> PolygonMesh:
+        """The mesh after the last steps, with as few folds as can be."""
+        return relax_folded(self._whole(self._solved(mesh, LAST_STEPS)), self._errors)
+
+    def _errors(self, mesh: PolygonMesh) -> Floats:
+        """The largest distance ``(F,)`` of each polygon's refinement."""
+        return face_errors(mesh, self.dense, self.fit.options)
 
     def _added(self, mesh: PolygonMesh, errors: Floats, limit: float) -> PolygonMesh:
         room = (self.fit.budget or 0) - mesh.face_count

@@ -1,7 +1,7 @@
 """Residuals as linear functions of the unknowns, and the step that minimizes their squares.
 
-Fold residuals count only where they are positive: the step is sought with those that are, and again with those that
-would be after it.
+Fold residuals count only where they are positive: the step is sought with those that are, the next one from the same
+place with those that would be after it.
 """
 
 from __future__ import annotations
@@ -16,20 +16,19 @@ from curvify.simplify.model import Group, Model, State
 from curvify.simplify.residuals import Residuals
 from curvify.simplify.slots import Derivatives, Unknowns, derivatives
 
-#: Times that the set of corners that would fold is found anew.
-ROUNDS = 4
-
 
 @record
 class Linear:
-    """Residuals r + J x for unknowns x: ``hessian`` J^T J and ``gradient`` J^T r of the distances; ``folds (C,n)`` and
-    ``lack (C,)``, J and r of the folds.
+    """Residuals r + J x for unknowns x: ``hessian`` J^T J and ``gradient`` J^T r of the distances; ``folds (R,n)`` and
+    ``lack (R,)``, J and r of the openings of ``corners (R/3,)``, three each; which of them are ``active (R,)``.
     """
 
     hessian: Any
     gradient: Floats
     folds: Any
     lack: Floats
+    corners: Ints
+    active: Bools
 
     def gain(self, step: Floats) -> float:
         """By how much a step should lower the sum of the squares."""
@@ -37,31 +36,25 @@ class Linear:
         distances = 2 * self.gradient @ step + step @ (self.hessian @ step)
         return float(before @ before - after @ after - distances)
 
-    def step(self, damping: Floats) -> Floats:
-        """The step ``(n,)`` that minimizes the squares and x^T D x, for ``damping (n,)`` the diagonal of D."""
-        active = self.lack > 0
-        for _ in range(ROUNDS):
-            step = self._step(damping, active)
-            positive = self.lack + self.folds @ step > 0
-            if np.array_equal(positive, active):
-                break
-            active = positive
-        return step
+    def step(self, damping: Floats, stiffness: Floats | None = None) -> Floats:
+        """The step ``(n,)`` that minimizes the squares and x^T D x, for ``damping (n,)`` the diagonal of D.
 
-    def _step(self, damping: Floats, active: Bools) -> Floats:
-        """The same with just the folds ``active (C,)``.
-
-        A direct solution: with minimum degree ordering as fast as conjugate gradients to three digits, and it does not
-        depend on the damping.
+        ``stiffness (C,3)`` are factors on the weights of openings. Those count that lack something now, or would have
+        after the step before. A direct solution: with minimum degree ordering as fast as conjugate gradients to three
+        digits, and it does not depend on the damping.
         """
         from scipy.sparse import diags_array
         from scipy.sparse.linalg import splu
 
-        rows = self.folds[active]
+        factors = np.ones_like(self.lack) if stiffness is None else stiffness[self.corners].ravel()
+        factors = factors * self.active
+        rows = diags_array(factors) @ self.folds
         matrix = (self.hessian + rows.T @ rows + diags_array(damping)).tocsc()
         options = {"SymmetricMode": True}
-        factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-        return -factors.solve(self.gradient + rows.T @ self.lack[active])
+        solved = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        step = -solved.solve(self.gradient + rows.T @ (factors * self.lack))
+        self.active = self.lack + self.folds @ step > 0
+        return np.asarray(step)
 
 
 @record
@@ -91,15 +84,18 @@ class Rows:
 
 def linearized(model: Model, state: State, found: Residuals, unknowns: Unknowns) -> Linear:
     """Residuals as linear functions of the unknowns about a state."""
-    distances, folds = Rows([], [], []), Rows([], [], [])
+    distances, folds, corners = Rows([], [], []), Rows([], [], []), []
     for group in model.groups:
         by = derivatives(model, group, state, unknowns)
         if by is not None:
             _add_forward(distances, group, by, found)
             _add_reverse(distances, group, by, found)
             _add_folds(folds, group, by, found)
+            corners.append(group.apart.corners.ravel())
     jacobian, right = distances.matrix(unknowns.count)
-    return Linear((jacobian.T @ jacobian).tocsc(), jacobian.T @ right, *folds.matrix(unknowns.count))
+    by_folds, lack = folds.matrix(unknowns.count)
+    normal = (jacobian.T @ jacobian).tocsc()
+    return Linear(normal, jacobian.T @ right, by_folds, lack, np.concatenate(corners), lack > 0)
 
 
 def _add_forward(rows: Rows, group: Group, by: Derivatives, found: Residuals) -> None:
@@ -122,7 +118,8 @@ def _add_reverse(rows: Rows, group: Group, by: Derivatives, found: Residuals) ->
 
 
 def _add_folds(rows: Rows, group: Group, by: Derivatives, found: Residuals) -> None:
-    count, sides, slots = by.sines.shape
+    count, sides, _, slots = by.sines.shape
     corners = group.apart.corners.ravel()
-    values = -found.fold_weights[corners, None] * by.sines.reshape(count * sides, slots)
-    rows.add(values, np.repeat(by.unknowns, sides, axis=0), found.folds[corners])
+    values = -found.fold_weights[corners, None, None] * by.sines.reshape(count * sides, 3, slots)
+    columns = np.repeat(by.unknowns, 3 * sides, axis=0)
+    rows.add(values.reshape(-1, slots), columns, found.folds[corners].ravel())

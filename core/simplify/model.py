@@ -66,15 +66,22 @@ class Group:
 
 
 @record
-class Samples:
-    """Samples of all patches: ``points``, unit ``normals (M,3)``; ``sines (C,)`` with which corners open, and those
-    ``adjusted (C,)`` that cannot keep their normals.
+class Openings:
+    """Sines ``(C,3)`` with which patches open at each corner and along the side after it, and with which the polygon
+    turns there; the corners ``adjusted (C,)`` that cannot keep their normals.
     """
+
+    sines: Floats
+    adjusted: Bools
+
+
+@record
+class Samples:
+    """Samples of all patches: ``points``, unit ``normals (M,3)``; how they open."""
 
     points: Floats
     normals: Floats
-    sines: Floats
-    adjusted: Bools
+    openings: Openings
 
 
 @record
@@ -113,6 +120,11 @@ class Model:
         a, b = self.topology.edges.T
         return np.linalg.norm(state.positions[b] - state.positions[a], axis=1)
 
+    @property
+    def free_faces(self) -> Bools:
+        """Pieces ``(F,)`` at which anything may change."""
+        return self.faces_with(self.free_vertices[self.topology.vertices] | self.free_sectors[self.sectors])
+
     def faces_with(self, corners: Bools) -> Bools:
         """Pieces ``(F,)`` with any of the corners ``(C,)``."""
         return np.bincount(self.topology.faces, corners) > 0
@@ -123,15 +135,27 @@ class Model:
         groups = [replaced(g, apart=replaced(g.apart, lines=lines[g.vertices])) for g in self.groups]
         return replaced(self, groups=groups)
 
+    def openings(self, state: State) -> Openings:
+        """How all patches open."""
+        sines, adjusted = self._no_openings()
+        for group in self.groups:
+            opening, lost = group.apart.openings(*group.arrays(state))
+            sines[group.apart.corners], adjusted[group.apart.corners] = opening, lost
+        return Openings(sines, adjusted)
+
+    def _no_openings(self) -> tuple[Floats, Bools]:
+        count = len(self.topology.vertices)
+        return np.empty((count, 3)), np.empty(count, dtype=bool)
+
     def samples(self, state: State) -> Samples:
         """Samples of all patches."""
         points, normals = np.empty((len(self.sample_faces), 3)), np.empty((len(self.sample_faces), 3))
-        sines, adjusted = np.empty(len(self.topology.vertices)), np.empty(len(self.topology.vertices), dtype=bool)
+        sines, adjusted = self._no_openings()
         for group in self.groups:
             at, upright, opening, lost = group.apart.with_normals(*group.arrays(state))
             points[group.rows], normals[group.rows] = at.reshape(-1, 3), upright.reshape(-1, 3)
             sines[group.apart.corners], adjusted[group.apart.corners] = opening, lost
-        return Samples(points, normals, sines, adjusted)
+        return Samples(points, normals, Openings(sines, adjusted))
 
     def mesh(self, state: State) -> PolygonMesh:
         """The coarse mesh with the positions and the normals of a state."""

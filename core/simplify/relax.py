@@ -5,10 +5,12 @@ Positions and polygons stay as they are. Both remedies are ours.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from curvify.arrays import distinct, take_rows
-from curvify.mesh import Ints, PolygonMesh
+from curvify.mesh import Bools, Floats, Ints, PolygonMesh
 from curvify.normals import degrees_between, sector_normals, unit
 from curvify.options import MeshOptions
 from curvify.prepare import Coarse, prepare_mesh
@@ -17,24 +19,30 @@ from curvify.schemes.construction import distinct_normals
 from curvify.simplify.folds import ROUNDS, Folds, folded_corners
 from curvify.topology import Topology
 
+#: How far each polygon ``(F,)`` of a mesh errs.
+Errors = Callable[[PolygonMesh], Floats]
 #: A crease of a flat polygon that leaves its chord by more than this (degrees) at a corner that folds is made straight.
 OFF_CHORD = 10.0
 #: The shares of the way to the mean normal of their polygons by which normals are turned, one after the other.
 TURNS = (0.25, 0.5)
 
 
-def relax_folded(mesh: PolygonMesh) -> PolygonMesh:
-    """The mesh with fewer reversed corners, of which only marks and normals differ."""
-    return lean_less(straighten_folded(mesh))
+def relax_folded(mesh: PolygonMesh, errors: Errors | None = None) -> PolygonMesh:
+    """The mesh with fewer reversed corners, of which only marks and normals differ.
+
+    With ``errors`` the largest of them does not grow where creases are made straight.
+    """
+    return lean_less(straighten_folded(mesh, errors))
 
 
-def straighten_folded(mesh: PolygonMesh) -> PolygonMesh:
+def straighten_folded(mesh: PolygonMesh, errors: Errors | None = None) -> PolygonMesh:
     """Mark creases of flat polygons as straight that leave their chords at reversed corners, where that helps.
 
     Between polygons that are nearly in one plane the direction across both normals, which a crease takes, is hardly
-    determined: a tenth of a degree in a normal can turn it by sixty.
+    determined: a tenth of a degree in a normal can turn it by sixty. With ``errors`` creases stay as they are where
+    polygons would err more than any does.
     """
-    tried = np.zeros(0, dtype=np.int64)
+    tried, limit = np.zeros(0, dtype=np.int64), np.inf
     for _ in range(ROUNDS):
         coarse, folds = prepare_mesh(mesh, MeshOptions(weld="never")), folded_corners(mesh)
         edges = _creases_to_straighten(mesh, coarse, folds)
@@ -44,8 +52,20 @@ def straighten_folded(mesh: PolygonMesh) -> PolygonMesh:
         tried = np.concatenate([tried, edges])
         before = _reversed_at(coarse.topology, folds)
         after = _reversed_at(coarse.topology, folded_corners(_with_straight(mesh, coarse.topology.edges[edges])))
-        mesh = _with_straight(mesh, coarse.topology.edges[edges[after[edges] < before[edges]]])
+        edges = edges[after[edges] < before[edges]]
+        if errors is not None and len(edges):
+            limit = min(limit, float(errors(mesh).max()))
+            edges = edges[_harmless(mesh, coarse.topology, edges, errors, limit)]
+        mesh = _with_straight(mesh, coarse.topology.edges[edges])
     return mesh
+
+
+def _harmless(mesh: PolygonMesh, topology: Topology, edges: Ints, errors: Errors, limit: float) -> Bools:
+    """Which of ``edges (e,)``, made straight, leave the errors of all polygons at their ends within the limit."""
+    large = errors(_with_straight(mesh, topology.edges[edges])) > limit
+    touched = np.zeros(topology.vertex_count, dtype=bool)
+    touched[topology.vertices[large[topology.faces]]] = True
+    return np.asarray(~touched[topology.edges[edges]].any(axis=1))
 
 
 def _with_straight(mesh: PolygonMesh, edges: Ints) -> PolygonMesh:

@@ -2,9 +2,10 @@
 
 *Forward*: from samples of the patches to their nearest points on the dense mesh. *Reverse*: from samples of the dense
 mesh to the tessellated patches, along the normals there; half of the way from a triangle to the planes at its corners
-takes away most of the tessellation's error (Boubekeur and Alexa, "Phong tessellation", 2008). *Folds*: what corners of
-patches lack of opening by 8 degrees. Weighted and squared they add up to a mean square distance over the diagonal's
-square.
+takes away most of the tessellation's error (Boubekeur and Alexa, "Phong tessellation", 2008). *Folds*: what patches
+lack of opening by 8 degrees at their corners and along their sides, and what corners of polygons lack of turning by one
+degree: `refine` cuts polygons that fold or are not convex. Weighted and squared they add up to a mean square distance
+over the diagonal's square.
 """
 
 from __future__ import annotations
@@ -15,15 +16,19 @@ from curvify.arrays import cross
 from curvify.mesh import Floats, Ints
 from curvify.nearest import Nearest, places_on, spread
 from curvify.normals import unit
+from curvify.polygons import REFLEX
 from curvify.records import record
+from curvify.simplify.folds import LEAST_SINE
 from curvify.simplify.model import Model, Samples
 from curvify.simplify.triangles import Triangles
 
 #: Samples of the dense mesh for each patch, the least and the most in all; what all weigh against the patches' samples.
 REVERSE_SAMPLES, LEAST_SAMPLES, MOST_SAMPLES = 50, 2_000, 20_000
 REVERSE_WEIGHT = 0.5
-#: Sine with which corners should open, and the weight of what they lack.
+#: Sine with which patches should open, and the weight of what they lack.
 OPEN, BARRIER = float(np.sin(np.radians(8.0))), 0.3
+#: Sine with which corners of polygons should turn (1 degree), and the least that is asked for anywhere.
+TURN, BARELY = 0.0175, 0.005
 #: Closer than this share of the diagonal, the dense face's normal is the direction.
 TOUCHING = 1e-9
 #: A sample farther than this share of the mean edge, less than so much of it along the normal, lies beyond an edge.
@@ -53,18 +58,19 @@ class Target:
 
 @record
 class Weights:
-    """Square roots of the weights of forward ``(M,)``, reverse ``(m,)`` and fold residuals ``(C,)``; ``least (C,)`` the
-    sine with which each corner should open.
+    """Square roots of the weights of forward ``(M,)``, reverse ``(m,)`` and fold residuals ``(C,)``; the ``least``
+    sines ``(C,3)`` that openings should have, and the ``limit (C,3)`` that they must keep.
     """
 
     forward: Floats
     reverse: Floats
     fold: Floats
     least: Floats
+    limit: Floats
 
     @classmethod
     def of(cls, model: Model, target: Target) -> Weights:
-        """Patches count by their area at the start. Corners between two creases or boundaries may be straight."""
+        """Patches count by their area at the start; where nothing may change, folds do not."""
         topology, scale = model.topology, 1 / target.dense.diagonal
         area = face_areas(model)
         share = area / area.sum()
@@ -72,11 +78,29 @@ class Weights:
         forward = (share / sizes)[model.sample_faces]
         reverse = np.full(len(target.samples), REVERSE_WEIGHT / max(len(target.samples), 1))
         fold = BARRIER * model.edge_length * np.sqrt((share / topology.sizes)[topology.faces])
-        least = np.empty(len(topology.vertices))
-        for group in model.groups:
-            line = group.apart.sharp.any(axis=2) | ~group.apart.interior
-            least[group.apart.corners] = np.where(line & np.roll(line, 1, axis=1), 0.0, OPEN)
-        return cls(scale * np.sqrt(forward), scale * np.sqrt(reverse), scale * fold, least)
+        fold[~model.free_faces[topology.faces]] = 0.0
+        least, limit = _openings(model)
+        return cls(scale * np.sqrt(forward), scale * np.sqrt(reverse), scale * fold, least, limit)
+
+
+def _openings(model: Model) -> tuple[Floats, Floats]:
+    """The sines ``(C,3)`` with which patches should open and polygons turn, and the limits that steps must keep.
+
+    Corners between two creases or boundaries, sides beside them and corners of polygons may be as straight as they are.
+    """
+    sines, line = model.openings(model.start).sines, np.empty(len(model.topology.vertices), dtype=bool)
+    for group in model.groups:
+        sharp = group.apart.sharp.any(axis=2) | ~group.apart.interior
+        line[group.apart.corners] = sharp & np.roll(sharp, 1, axis=1)
+    line &= sines[:, 0] < OPEN
+    beside = line | line[model.topology.next]
+    may = np.stack([line, beside, np.ones_like(line)], axis=1)
+    most = np.array([OPEN, OPEN, TURN])
+    least = np.where(may, np.clip(sines, BARELY, most), most)
+    limit = np.zeros_like(least)
+    limit[:, 0] = np.where(line, -LEAST_SINE, LEAST_SINE)
+    limit[:, 2] = -REFLEX / 2
+    return least, limit
 
 
 def face_areas(model: Model) -> Floats:
@@ -92,7 +116,7 @@ class Residuals:
     """Weighted residuals of a state.
 
     ``forward (M,)``, which grow as samples move along ``directions (M,3)``; ``reverse (m,)``, which shrink as the
-    samples ``corners (m,3)`` of a patch move along ``pulls (m,3,3)``; ``folds (C,)``, which count where positive, and
+    samples ``corners (m,3)`` of a patch move along ``pulls (m,3,3)``; ``folds (C,3)``, which count where positive, and
     ``fold_weights (C,)``, by which they shrink as sines grow.
     """
 
@@ -108,14 +132,14 @@ class Residuals:
     def total(self) -> float:
         """Sum of the squares."""
         lack = np.maximum(self.folds, 0.0)
-        return float(self.forward @ self.forward + self.reverse @ self.reverse + lack @ lack)
+        return float(self.forward @ self.forward + self.reverse @ self.reverse + (lack**2).sum())
 
     def by_face(self, model: Model) -> Floats:
         """Sum of the squares ``(F,)`` that belong to each piece."""
         total = np.zeros(model.face_count)
         np.add.at(total, model.sample_faces, self.forward**2)
         np.add.at(total, model.sample_faces[self.corners[:, 0]], self.reverse**2)
-        np.add.at(total, model.topology.faces, np.maximum(self.folds, 0.0) ** 2)
+        np.add.at(total, model.topology.faces, (np.maximum(self.folds, 0.0) ** 2).sum(axis=1))
         return total
 
 
@@ -133,7 +157,7 @@ def residuals(model: Model, target: Target, weights: Weights, samples: Samples) 
         weights.reverse * reverse,
         corners,
         weights.reverse[:, None, None] * pulls,
-        weights.fold * (weights.least - samples.sines),
+        weights.fold[:, None] * (weights.least - samples.openings.sines),
         weights.fold,
     )
 

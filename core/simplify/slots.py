@@ -19,7 +19,7 @@ from curvify.simplify.model import Group, Model, State, tangent_frames
 #: Step of the differences, as a share of the mean edge and in radians.
 STEP = 1e-6
 #: Patches evaluated at once.
-BATCH = 1024
+BATCH = 512
 
 
 @record
@@ -59,7 +59,7 @@ class Slot:
 @record
 class Derivatives:
     """Derivatives by the slots of a group: ``unknowns (f,k)``; of samples ``points (f,m,3,k)``; of ``sines
-    (f,n,k)``.
+    (f,n,3,k)``.
     """
 
     unknowns: Ints
@@ -105,7 +105,7 @@ def derivatives(model: Model, group: Group, state: State, unknowns: Unknowns) ->
         steps = np.array([STEP if slot.array else length for slot in part])
         block = slice(begin, begin + len(part))
         by_points[..., block] = np.moveaxis((moved - points) / steps[:, None, None, None], 0, -1)
-        by_sines[..., block] = np.moveaxis((opened - sines) / steps[:, None, None], 0, -1)
+        by_sines[..., block] = np.moveaxis((opened - sines) / steps[:, None, None, None], 0, -1)
     return Derivatives(np.stack([slot.unknowns for slot in slots], axis=1), by_points, by_sines)
 
 
@@ -119,7 +119,7 @@ def _change(array: Floats, slot: Slot, length: float, frames: Floats, sectors: I
 
 
 def _samples(apart: Apart, arrays: list[Floats], copies: int) -> tuple[Floats, Floats]:
-    """Samples ``(c,f,m,3)`` and sines ``(c,f,n)`` of copies of all patches with arrays ``(c,f,...)`` of their own."""
+    """Samples ``(c,f,m,3)`` and sines ``(c,f,n,3)`` of copies of all patches with arrays ``(c,f,...)`` of their own."""
     every = apart.take(np.tile(np.arange(len(apart.faces)), copies))
     found = every.samples(*(array.reshape(-1, *array.shape[2:]) for array in arrays))
     points, sines = (values.reshape(copies, -1, *values.shape[1:]) for values in found)

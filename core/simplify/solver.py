@@ -1,7 +1,8 @@
 """Levenberg and Marquardt's method for the fit, with a damping of its own for every unknown.
 
 One patch that folds must not hold up all others: where the residuals of a patch grow, only the unknowns at its corners
-are damped more.
+are damped more. A step must not make `refine` cut polygons that are whole: where one would, those weigh more against
+folding and the step is sought again.
 """
 
 from __future__ import annotations
@@ -12,20 +13,25 @@ import numpy as np
 
 from curvify.mesh import Bools, Floats
 from curvify.records import record
-from curvify.simplify.folds import LEAST_SINE
 from curvify.simplify.linear import Linear, linearized
-from curvify.simplify.model import Model, Samples, State
-from curvify.simplify.residuals import OPEN, Residuals, Target, Weights, residuals
+from curvify.simplify.model import Model, Openings, Samples, State
+from curvify.simplify.residuals import Residuals, Target, Weights, residuals
 from curvify.simplify.slots import Unknowns
 
 #: Gain of the residual below which another step is not worth it.
 LEAST_GAIN = 0.01
-#: Damping at first, as a share of the median diagonal; its factors after a success and a failure; the least.
-DAMPING, EASED, RAISED, LEAST_DAMPING = 0.1, 0.5, 8.0, 0.01
+#: Damping at first, as a share of the median diagonal; its factors after a success and a failure; the least, and the
+#: most that single patches can ask for.
+DAMPING, EASED, RAISED, LEAST_DAMPING, MOST_DAMPING = 0.1, 0.5, 8.0, 0.01, 10.0
 #: A step that gains this share of what was predicted eases damping further, and has no least.
 AS_PREDICTED, FAR_EASED = 0.9, 0.1
 #: Tries of one step, and the factor on its parts that would break patches.
 TRIES, SHRUNK = 4, 0.3
+#: Where a step would break patches it is sought again, at most so often in all, with these factors on what the weights
+#: of their openings and the damping of their unknowns were.
+HELD, STIFFENED, HELD_DAMPING = 4, 3.0, 2.0
+#: A step after which one patch has grown by more than this share of all residuals is tried again.
+SPOILED = 0.02
 #: Largest tilt of a step in radians; largest move as a share of the mean edge and of the shortest edge at the vertex.
 LARGEST_TILT, LARGEST_MOVE = 0.35, 0.25
 
@@ -44,6 +50,15 @@ class Solution:
 
 
 @record
+class Problem:
+    """What residuals are measured against, and what may change."""
+
+    target: Target
+    weights: Weights
+    unknowns: Unknowns
+
+
+@record
 class Here:
     """A state with its samples and residuals."""
 
@@ -53,21 +68,21 @@ class Here:
     found: Residuals
 
     @classmethod
-    def at(cls, model: Model, target: Target, weights: Weights, state: State) -> Here:
+    def at(cls, model: Model, problem: Problem, state: State) -> Here:
         """Residuals of a state."""
         there = model.at(state)
         samples = there.samples(state)
-        return cls(there, state, samples, residuals(there, target, weights, samples))
+        return cls(there, state, samples, residuals(there, problem.target, problem.weights, samples))
 
 
 def solve(model: Model, target: Target, unknowns: Unknowns, steps: int, report: Report | None = None) -> Solution:
     """Lower the residuals in a number of steps at most, each of which lowers them."""
-    weights = Weights.of(model, target)
+    problem = Problem(target, Weights.of(model, target), unknowns)
     damping = np.full(unknowns.count, DAMPING)
-    here = Here.at(model, target, weights, model.start)
+    here = Here.at(model, problem, model.start)
     totals = [here.found.total]
     for _ in range(steps if unknowns.count else 0):
-        there = _improved(here, target, weights, unknowns, damping)
+        there = _improved(here, problem, damping)
         if there is None:
             break
         here = there
@@ -79,46 +94,75 @@ def solve(model: Model, target: Target, unknowns: Unknowns, steps: int, report: 
     return Solution(here.state, [float(np.sqrt(total)) for total in totals])
 
 
-def _improved(here: Here, target: Target, weights: Weights, unknowns: Unknowns, damping: Floats) -> Here | None:
+def _improved(here: Here, problem: Problem, damping: Floats) -> Here | None:
     """A state with smaller residuals, if a few tries find one. ``damping (n,)`` is changed in place."""
-    linear = linearized(here.model, here.state, here.found, unknowns)
-    scale = _scale(linear, unknowns)
-    before = here.found.by_face(here.model)
-    reach = _reach(here, unknowns)
+    linear = linearized(here.model, here.state, here.found, problem.unknowns)
+    scale, share = _scale(linear, problem.unknowns), np.ones(problem.unknowns.count)
+    before, best = here.found.by_face(here.model), here
     for _ in range(TRIES):
-        step = _kept_whole(here, linear.step(damping * scale), weights, unknowns, reach)
-        there = Here.at(here.model, target, weights, _moved(here.state, step, unknowns, reach))
-        worse = there.found.by_face(here.model) > before + before.mean()
-        bad = _touched(here.model, unknowns, worse)
-        damping[bad] *= RAISED
-        if there.found.total < here.found.total:
-            gain = here.found.total - there.found.total
-            if gain > AS_PREDICTED * linear.gain(step):
-                damping[~bad] *= FAR_EASED
-            else:
-                damping[~bad] = np.maximum(EASED * damping[~bad], LEAST_DAMPING)
-            return there
+        step, held = _whole_step(here, linear, problem, damping, scale)
+        step *= share
+        there = Here.at(here.model, problem, _moved(here, step, problem.unknowns))
+        worse = there.found.by_face(here.model) - before
+        bad = _touched(here.model, problem.unknowns, worse > before.mean())
+        _damp(damping, bad, RAISED)
+        share[bad] *= SHRUNK
+        if there.found.total < best.found.total:
+            best = there
+            if worse.max() <= SPOILED * here.found.total:
+                predicted = not held and here.found.total - there.found.total > AS_PREDICTED * linear.gain(step)
+                eased = FAR_EASED * damping if predicted else np.maximum(EASED * damping, LEAST_DAMPING)
+                damping[~bad] = eased[~bad]
+                break
+        elif best is not here:
+            break
         if not bad.any():
             damping *= RAISED
-    return None
+    return None if best is here else best
 
 
-def _kept_whole(here: Here, step: Floats, weights: Weights, unknowns: Unknowns, reach: Floats) -> Floats:
-    """The step without the unknowns at patches that it would break: fold at a corner, or take a normal from one."""
-    step = step.copy()
-    for _ in range(TRIES):
-        state = _moved(here.state, step, unknowns, reach)
-        samples = here.model.at(state).samples(state)
-        broken = _broken(samples, weights) & ~_broken(here.samples, weights)
+def _whole_step(
+    here: Here, linear: Linear, problem: Problem, damping: Floats, scale: Floats
+) -> tuple[Floats, bool]:
+    """A step ``(n,)`` that breaks no patch, and whether one had to be held back for that.
+
+    Patches that it would break are made stiffer and their unknowns are damped, for a few times; what still breaks then
+    goes less far.
+    """
+    stiffness = np.ones_like(problem.weights.least)
+    step = linear.step(damping * scale, stiffness)
+    broken = first = _would_break(here, step, problem)
+    for _ in range(HELD - 1):
         if not broken.any():
             break
-        step[_touched(here.model, unknowns, here.model.faces_with(broken))] *= SHRUNK
-    return step
+        stiffness[broken] *= STIFFENED
+        _damp(damping, _at_corners(here.model, problem.unknowns, broken), HELD_DAMPING)
+        step = linear.step(damping * scale, stiffness)
+        broken = _would_break(here, step, problem)
+    for _ in range(TRIES):
+        if not broken.any():
+            break
+        step[_at_corners(here.model, problem.unknowns, broken)] *= SHRUNK
+        broken = _would_break(here, step, problem)
+    return step, bool(first.any())
 
 
-def _broken(samples: Samples, weights: Weights) -> Bools:
-    """Corners ``(C,)`` that fold, or cannot keep their normals."""
-    return samples.adjusted | (samples.sines < weights.least - OPEN - LEAST_SINE)
+def _damp(damping: Floats, unknowns: Bools, factor: float) -> None:
+    """Damp some unknowns more, in place, but not beyond the most that single patches can ask for."""
+    more = np.minimum(factor * damping[unknowns], MOST_DAMPING)
+    damping[unknowns] = np.maximum(more, damping[unknowns])
+
+
+def _would_break(here: Here, step: Floats, problem: Problem) -> Bools:
+    """Openings ``(C,3)`` that a step would break: patches that fold, or cannot keep a normal at a corner."""
+    state = _moved(here, step, problem.unknowns)
+    openings = here.model.at(state).openings(state)
+    return _broken(openings, problem.weights) & ~_broken(here.samples.openings, problem.weights)
+
+
+def _broken(openings: Openings, weights: Weights) -> Bools:
+    """Openings ``(C,3)`` that are too small, all three where a corner cannot keep its normal."""
+    return openings.adjusted[:, None] | (openings.sines <= weights.limit)
 
 
 def _scale(linear: Linear, unknowns: Unknowns) -> Floats:
@@ -140,10 +184,11 @@ def _reach(here: Here, unknowns: Unknowns) -> Floats:
     return LARGEST_MOVE * shortest[unknowns.vertices >= 0]
 
 
-def _moved(state: State, step: Floats, unknowns: Unknowns, reach: Floats) -> State:
+def _moved(here: Here, step: Floats, unknowns: Unknowns) -> State:
     """The state after a step, its parts cut to what is allowed."""
+    state = here.state
     moves, tilts = np.zeros_like(state.positions), np.zeros((len(state.normals), 2))
-    moves[unknowns.vertices >= 0] = limited(step[: unknowns.moves].reshape(-1, 3), reach)
+    moves[unknowns.vertices >= 0] = limited(step[: unknowns.moves].reshape(-1, 3), _reach(here, unknowns))
     most = np.full((unknowns.count - unknowns.moves) // 2, LARGEST_TILT)
     tilts[unknowns.sectors >= 0] = limited(step[unknowns.moves :].reshape(-1, 2), most)
     return state.moved(moves, tilts)
@@ -153,6 +198,11 @@ def limited(vectors: Floats, most: Floats) -> Floats:
     """Vectors ``(n,d)`` no longer than ``most (n,)``."""
     length = np.linalg.norm(vectors, axis=1)
     return vectors * np.minimum(1.0, most / np.maximum(length, 1e-300))[:, None]
+
+
+def _at_corners(model: Model, unknowns: Unknowns, openings: Bools) -> Bools:
+    """Unknowns ``(n,)`` of the pieces with some of the openings ``(C,3)``."""
+    return _touched(model, unknowns, model.faces_with(np.asarray(openings.any(axis=1))))
 
 
 def _touched(model: Model, unknowns: Unknowns, faces: Bools) -> Bools:

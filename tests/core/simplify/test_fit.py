@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +14,17 @@ from curvify.errors import MeshError, OptionError
 from curvify.formats.marks_json import read_marks
 from curvify.mesh import PolygonMesh
 from curvify.nearest import Nearest
+from curvify.prepare import prepare_mesh
 from curvify.records import replaced
 from curvify.sampling import kite_sampling
+from curvify.schemes.cross_tangents import start_share
+from curvify.schemes.folds import blended_inward
 from curvify.schemes.gregory import Options as Refining
+from curvify.schemes.gregory import patchwork_of
 from curvify.simplify import Fit, Options, fit_mesh, simplify, simplify_and_fit
-from curvify.simplify.accuracy import accuracy
+from curvify.simplify.accuracy import accuracy, flat_triangles
 from curvify.simplify.adapt import add_where_worst, face_errors, halved
+from curvify.simplify.apart import turn_sines
 from curvify.simplify.checks import differences
 from curvify.simplify.folds import folded_corners
 from curvify.simplify.linear import linearized
@@ -116,8 +122,33 @@ def test_derivatives_agree_with_central_differences(name):
         steps = np.where(by.unknowns >= 0, step[by.unknowns], 0.0)
         expected = ((ahead.points - behind.points) / 2e-5)[group.rows].reshape(by.points.shape[:3])
         assert np.einsum("fmik,fk->fmi", by.points, steps) == pytest.approx(expected, abs=1e-4)
-        opening = ((ahead.sines - behind.sines) / 2e-5)[group.apart.corners]
-        assert np.einsum("fnk,fk->fn", by.sines, steps) == pytest.approx(opening, abs=1e-3)
+        opening = ((ahead.openings.sines - behind.openings.sines) / 2e-5)[group.apart.corners]
+        assert np.einsum("fnck,fk->fnc", by.sines, steps) == pytest.approx(opening, abs=1e-3)
+
+
+def test_openings_tell_what_refine_would_cut():
+    """Triangles are never cut, so that the test of `refine` can be asked about all sides of a mesh of them."""
+    points, triangles = flat_triangles(sample("pawn"))
+    mesh = PolygonMesh(points, np.arange(0, 3 * len(triangles) + 1, 3), triangles.reshape(-1))
+    model = build_model(mesh, Refining())
+    random = np.random.default_rng(3)
+    tilts = 0.5 * random.standard_normal((len(model.start.normals), 2))
+    state = model.start.moved(0.1 * model.edge_length * random.standard_normal(points.shape), tilts)
+    work = patchwork_of(prepare_mesh(model.mesh(state)), Refining())
+    inward = blended_inward(partial(start_share, "precise"), work)
+    corner, side, turn = model.openings(state).sines.T
+    assert corner == pytest.approx(work.sines, abs=1e-9)
+    assert np.array_equal(side <= 0, inward <= 0)
+    assert 10 < (side <= 0).sum() < len(side) / 2
+    assert (turn > 0).all()
+
+
+def test_corners_turn_by_their_angles():
+    square = [[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    dart = [[0.0, 0, 0], [2, 0, 0], [0.5, 0.5, 0], [0, 2, 0]]
+    sines = turn_sines(np.array([square, dart]))
+    assert sines[0] == pytest.approx(1)
+    assert sines[1] == pytest.approx([1, np.sin(np.arctan(1 / 3)), -0.8, np.sin(np.arctan(1 / 3))])
 
 
 def test_the_linear_model_predicts_small_steps():
@@ -205,6 +236,18 @@ def test_few_corners_fold_after_a_fit():
     assert differences(result.simplified.mesh, result.mesh) == []
     found = [accuracy(mesh, result.simplified.original, 4000) for mesh in (result.simplified.mesh, result.mesh)]
     assert found[1]["refined"].rms < 0.5 * found[0]["refined"].rms
+
+
+def test_refine_need_not_cut_what_was_fitted():
+    dense = curvify.refine(sample("vase"), level=3)
+    quads = PolygonMesh(dense.positions, 4 * np.arange(len(dense.faces) + 1), dense.faces.reshape(-1))
+    before = simplify(quads, Options(faces=40))
+    pieces = [
+        len(patchwork_of(prepare_mesh(mesh), Refining()).split.source_faces)
+        for mesh in (before.mesh, fit_mesh(before.mesh, before.original, Fit()).mesh)
+    ]
+    assert pieces[0] > before.mesh.face_count
+    assert pieces[1] == before.mesh.face_count
 
 
 def capped_cylinder() -> PolygonMesh:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
-from curvify.mesh import Marks, PolygonMesh
+from curvify.mesh import Floats, Marks, PolygonMesh
 from curvify.normals import unit
 from curvify.simplify.folds import folded_corners
 from curvify.simplify.relax import lean_less, relax_folded, straighten_folded
@@ -55,6 +57,16 @@ def test_a_crease_that_is_not_of_a_flat_polygon_keeps_its_curve():
     mesh = roof(0.02)
     mesh.marks.flat_faces = np.zeros(0, dtype=np.int64)
     assert straighten_folded(mesh) is mesh
+
+
+def test_a_crease_keeps_its_curve_where_polygons_would_err_more():
+    mesh = roof(0.02)
+
+    def errors(worse: float) -> Callable[[PolygonMesh], Floats]:
+        return lambda changed: np.array([0.1, worse if len(changed.marks.straight_edges) else 0.2])
+
+    assert not len(straighten_folded(mesh, errors(0.3)).marks.straight_edges)
+    assert count(straighten_folded(mesh, errors(0.2))) == 0
 
 
 @pytest.mark.parametrize("lean", [100, 110, 120])
