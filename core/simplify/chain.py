@@ -22,7 +22,8 @@ class Simplified:
 
     ``mesh`` with corner normals and marks; ``original`` the triangles of the input; ``dense`` those that were worked
     on, the same unless the input is very large; ``polygons`` in vertices of ``dense``, ``labels (F,)`` the region of
-    each of its triangles, ``creases (C,)`` half-edges; ``counts``; ``warnings``.
+    each of its triangles, ``creases (C,)`` half-edges; ``counts``; ``warnings``, of which the first ones, ``lasting``,
+    hold whatever is done to the polygons later.
     """
 
     mesh: PolygonMesh
@@ -33,6 +34,7 @@ class Simplified:
     creases: Bools
     counts: dict[str, int]
     warnings: list[str]
+    lasting: int
 
 
 def simplify(mesh: PolygonMesh, options: Options, progress: Progress | None = None) -> Simplified:
@@ -45,8 +47,9 @@ def simplify(mesh: PolygonMesh, options: Options, progress: Progress | None = No
     original, notes = prepare_triangles(mesh, options.weld)
     dense = lightened(original, options.faces or options.proxies or 1, notes)
     metric = Metric.of(dense)
+    lasting = len(mesh.warnings) + len(notes)
     if options.faces is not None and options.faces >= dense.face_count:
-        notes.append(f"the mesh has only {count_of(dense.face_count, 'triangle')}; they are kept as they are")
+        notes.append(f"the mesh has only {count_of(dense.face_count, 'triangle')}; more faces would add nothing")
         attempt = as_they_are(dense, metric, options)
     else:
         attempt = find_polygons(dense, metric, options, notes, tell)
@@ -54,10 +57,16 @@ def simplify(mesh: PolygonMesh, options: Options, progress: Progress | None = No
     check_polygons(dense, attempt.drawn.polygons)
     counts = {"input_faces": mesh.face_count, "triangles": original.face_count}
     counts["crossings"] = len(crossing_polygons(attempt.drawn.mesh))
-    if counts["crossings"]:
-        places = count_of(counts["crossings"], "place")
-        notes.append(f"polygons cross each other in {places}" + ", and so does the input" * crosses_itself(original))
-    return _result(mesh, original, dense, attempt, counts, [*mesh.warnings, *notes])
+    notes += crossing_notes(counts["crossings"], original)
+    return _result(mesh, original, dense, attempt, counts, [*mesh.warnings, *notes], lasting)
+
+
+def crossing_notes(crossings: int, original: Triangles) -> list[str]:
+    """What there is to say of polygons that cross in so many places."""
+    if not crossings:
+        return []
+    places = count_of(crossings, "place")
+    return [f"polygons cross each other in {places}" + ", and so does the input" * crosses_itself(original)]
 
 
 def _result(
@@ -67,6 +76,7 @@ def _result(
     attempt: Attempt,
     counts: dict[str, int],
     warnings: list[str],
+    lasting: int,
 ) -> Simplified:
     """The mesh as the input's file would hold it, and what there is to say about it."""
     drawn = attempt.drawn
@@ -79,4 +89,4 @@ def _result(
         "crease_edges": len(coarse.marks.crease_edges),
         "flat_faces": len(coarse.marks.flat_faces),
     }
-    return Simplified(coarse, original, dense, drawn.polygons, attempt.labels, drawn.creases, counts, warnings)
+    return Simplified(coarse, original, dense, drawn.polygons, attempt.labels, drawn.creases, counts, warnings, lasting)

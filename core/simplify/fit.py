@@ -20,6 +20,7 @@ from curvify.prepare import prepare_mesh
 from curvify.schemes.gregory import Options, patchwork_of
 from curvify.simplify.adapt import add_where_worst, face_errors
 from curvify.simplify.folds import unfold
+from curvify.simplify.hold import held_back
 from curvify.simplify.model import build_model
 from curvify.simplify.relax import relax_folded
 from curvify.simplify.residuals import Target
@@ -137,7 +138,8 @@ class _Fitting:
         free = model.free_vertices if self.fit.mode == "full" else np.zeros_like(model.free_vertices)
         solution = solve(model, self.target, Unknowns.of(free, model.free_sectors), steps, self._report)
         self.history.append(solution.history)
-        return model.mesh(solution.state)
+        found = model.mesh(solution.state)
+        return held_back(mesh, found, self.fit.options.split_rule, cut=self.fit.budget is not None)
 
     def _report(self, residual: float) -> None:
         self.steps += 1

@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 
 from curvify.mesh import PolygonMesh
 from curvify.simplify.attempts import Options
-from curvify.simplify.chain import Simplified, simplify
+from curvify.simplify.chain import Simplified, crossing_notes, simplify
 from curvify.simplify.checks import check_mesh_like
 from curvify.simplify.crossings import crossing_polygons
 from curvify.simplify.fit import Fit, Fitted, Progress, fit_mesh
+from curvify.simplify.search import count_notes
 from curvify.words import count_of
 
 #: The share of the faces asked for, beyond the first few, that is kept for folds and large errors; the second one where
@@ -43,14 +44,17 @@ def simplify_and_fit(mesh: PolygonMesh, options: Options, fit: Fit, progress: Pr
         result = simplify(mesh, options, progress)
         return Result(result.mesh, result, Fitted(result.mesh, []), result.counts, result.warnings)
     first = replace(options, faces=_first_faces(options.faces, fit)) if options.faces is not None else options
+    tried = []
     for _ in range(TRIES):
         result, fitted = _simplified_and_fitted(mesh, first, options.faces, fit, tell)
         faces = fitted.mesh.face_count
+        tried.append((abs(faces - (options.faces or faces)), result, fitted))
         if first.faces is None or options.faces is None or result.mesh.face_count > options.faces:
             break  # not asked for, or not to be had
         if faces <= (1 + WITHIN) * options.faces:
             break
         first = replace(first, faces=max(int(first.faces * (1 + WITHIN / 2) * options.faces / faces), 1))
+    _, result, fitted = min(tried, key=lambda one: one[0])
     check_mesh_like(result.mesh, fitted.mesh)
     counts = result.counts | {
         "faces": fitted.mesh.face_count,
@@ -59,7 +63,18 @@ def simplify_and_fit(mesh: PolygonMesh, options: Options, fit: Fit, progress: Pr
         "flat_faces": len(fitted.mesh.marks.flat_faces),
         "crossings": len(crossing_polygons(fitted.mesh)),
     }
-    return Result(fitted.mesh, result, fitted, counts, [*result.warnings, *_notes(fit, fitted)])
+    warnings = [*result.warnings[: result.lasting], *_count_notes(options, result, fitted)]
+    warnings += [*crossing_notes(counts["crossings"], result.original), *_notes(fit, fitted)]
+    return Result(fitted.mesh, result, fitted, counts, warnings)
+
+
+def _count_notes(options: Options, result: Simplified, fitted: Fitted) -> list[str]:
+    """What there is to say of the number of faces, where another was asked for."""
+    if options.faces is None:
+        return []
+    if options.faces >= result.dense.face_count:
+        return result.warnings[result.lasting :][:1]
+    return count_notes(options.faces, fitted.mesh.face_count, result.mesh.face_count > options.faces)
 
 
 def _first_faces(faces: int, fit: Fit) -> int:

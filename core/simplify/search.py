@@ -149,13 +149,20 @@ def find_polygons(
     tell("crossings", 0.92)
     attempt = _untangled(dense, metric, attempt, options)
     wanted = options.faces
-    if wanted is not None and attempt.count > (1 + CLOSE) * wanted:
+    if wanted is not None:
+        notes += count_notes(wanted, attempt.count, least)
+    return attempt
+
+
+def count_notes(wanted: int, found: int, least: bool) -> list[str]:
+    """What there is to say of a number of faces that was not met; ``least`` where fewer were never found."""
+    if found > (1 + CLOSE) * wanted:
         why = "cannot hold this mesh's topology and creases" if least else "were not met"
         most = "are the fewest found" if least else "come nearest"
-        notes.append(f"{count_of(wanted, 'face')} {why}; {attempt.count:,} {most}")
-    elif wanted is not None and attempt.count < (1 - CLOSE) * wanted:
-        notes.append(f"{count_of(attempt.count, 'face')} hold everything; more would add nothing")
-    return attempt
+        return [f"{count_of(wanted, 'face')} {why}; {found:,} {most}"]
+    if found < (1 - CLOSE) * wanted:
+        return [f"{count_of(found, 'face')} hold everything; more would add nothing"]
+    return []
 
 
 def _found(dense: Triangles, metric: Metric, options: Options, tell: Progress) -> tuple[Attempt, bool]:
