@@ -66,7 +66,6 @@ def fit_files(
     from curvify.errors import MeshError
     from curvify.schemes.gregory import Options
     from curvify.simplify import Fit, fit_mesh
-    from curvify.simplify.checks import check_near
     from curvify.simplify.triangles import prepare_triangles
     from curvify.words import count_of
 
@@ -82,7 +81,6 @@ def fit_files(
         with files.naming(names[1], MeshError):
             triangles, notes = prepare_triangles(scan, weld or "auto")
     with timed(seconds, "fit"), files.naming(names[0], MeshError), console.progress(names[0]) as progress:
-        check_near(mesh, triangles)
         fitted = fit_mesh(mesh, triangles, wanted, progress.stage)
     steps = fitted.history[0]
     if steps[-1] > FAR:

@@ -19,6 +19,7 @@ from curvify.pieces import pieces_of, split_mesh
 from curvify.prepare import prepare_mesh
 from curvify.schemes.gregory import Options, patchwork_of
 from curvify.simplify.adapt import add_where_worst, face_errors
+from curvify.simplify.checks import check_near
 from curvify.simplify.folds import unfold
 from curvify.simplify.hold import held_back
 from curvify.simplify.model import build_model
@@ -72,12 +73,13 @@ class Fitted:
 
 
 def fit_mesh(mesh: PolygonMesh, dense: Triangles, fit: Fit, progress: Progress | None = None) -> Fitted:
-    """Fit a coarse mesh to a dense one. Raises MeshError for edges of more than two faces.
+    """Fit a coarse mesh to a dense one. Without a budget the faces stay as they are.
 
-    Without a budget the faces stay as they are.
+    Raises MeshError for edges of more than two faces, and for meshes that have nothing to do with each other.
     """
     if fit.mode == "none":
         return Fitted(mesh, [])
+    check_near(mesh, dense)
     target = Target.for_patches(dense, mesh.face_count)
     return _Fitting(fit, dense, target, progress or (lambda stage, share: None)).run(mesh)
 
