@@ -10,6 +10,7 @@ import click
 
 from curvify.cli import options
 from curvify.cli.group import COMMANDS, Command
+from curvify.cli.parameters import POSITIVE
 from curvify.cli.surfaces import with_refine_options
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ NOT_FORWARDED = ("input_format", "output_format", "no_clobber", "report", "dry_r
         "Batch",
         "-j",
         "--jobs",
-        type=options.POSITIVE,
+        type=POSITIVE,
         metavar="N",
         help="Files to work on at a time, each in a process of its own.  [default: one per processor]",
     ),

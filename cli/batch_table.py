@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from curvify.cli.answers import stamped
 from curvify.cli.batch_job import DONE, FAILED, NOT_RUN, SKIPPED, Job, Outcome
 from curvify.cli.console import size
-from curvify.cli.options import stamped
 from curvify.cli.report import write_report
 
 HEADINGS = ("file", "", "faces", "size", "seconds", "")

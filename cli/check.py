@@ -7,7 +7,9 @@ from typing import Any
 import click
 
 from curvify.cli import options
+from curvify.cli.answers import print_json
 from curvify.cli.group import COMMANDS, Command
+from curvify.cli.parameters import DEGREES, POSITIVE
 
 EXAMPLES = (
     ("Would a slicer take it?", "curvify check coarse.obj --watertight --manifold --positive-volume"),
@@ -41,19 +43,19 @@ def condition(name: str, help: str, type: Any = None, metavar: str | None = None
     condition(
         "--planar",
         "No side of a face leaves the face's plane by more than this many degrees.",
-        options.DEGREES,
+        DEGREES,
         "DEG",
     ),
     condition(
         "--g1",
         "No two faces meet at more than this angle, in degrees, across an edge that is not a crease. In a dense mesh "
         "of a smooth surface, twice the level halves these angles; kinks stay.",
-        options.DEGREES,
+        DEGREES,
         "DEG",
     ),
-    condition("--max-sides", "No face has more sides.", options.POSITIVE, "N"),
-    condition("--max-faces", "The mesh has no more faces.", options.POSITIVE, "N"),
-    condition("--max-pieces", "The mesh has no more connected pieces.", options.POSITIVE, "N"),
+    condition("--max-sides", "No face has more sides.", POSITIVE, "N"),
+    condition("--max-faces", "The mesh has no more faces.", POSITIVE, "N"),
+    condition("--max-pieces", "The mesh has no more connected pieces.", POSITIVE, "N"),
     options.weld,
     options.input_format,
     options.as_json,
@@ -88,7 +90,7 @@ def check_file(
     passed = all(finding.passed for finding in findings)
     if as_json:
         answer = {"input": input, "passed": passed, "checks": [finding.as_dict() for finding in findings]}
-        options.print_json("check", answer)
+        print_json("check", answer)
     elif not quiet:
         for finding in findings:
             click.echo(as_line(name, finding, finding.name.replace("_", "-")))

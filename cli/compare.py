@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from curvify.cli import options
+from curvify.cli.answers import print_json
 from curvify.cli.group import COMMANDS, Command
+from curvify.cli.parameters import FILE, POSITIVE, Length, Number
 
 if TYPE_CHECKING:
     from curvify.mesh import Floats, PolygonMesh
@@ -28,13 +30,13 @@ HEAT_FORMATS = ("png", "ply", "obj", "off", "glb")
 
 
 @click.command(name="compare", cls=Command, examples=EXAMPLES, short_help=COMMANDS["compare"])
-@click.argument("a", metavar="A", type=options.FILE)
-@click.argument("b", metavar="B", type=options.FILE)
+@click.argument("a", metavar="A", type=FILE)
+@click.argument("b", metavar="B", type=FILE)
 @options.with_options(
     options.option(
         "Tolerances",
         "--tolerance",
-        type=options.Length(),
+        type=Length(),
         metavar="T",
         help="How far points may be apart, in units of the file, or as a share of the diagonal of A: 0.001%. Without "
         "it every number must be equal.",
@@ -42,7 +44,7 @@ HEAT_FORMATS = ("png", "ply", "obj", "off", "glb")
     options.option(
         "Tolerances",
         "--normal-tolerance",
-        type=options.Number(min=0, max=180),
+        type=Number(min=0, max=180),
         metavar="DEG",
         help="How far normals may be apart.  [default: 0.1 with --tolerance]",
     ),
@@ -55,7 +57,7 @@ HEAT_FORMATS = ("png", "ply", "obj", "off", "glb")
     options.option(
         "Comparison",
         "--samples",
-        type=options.POSITIVE,
+        type=POSITIVE,
         default=100_000,
         show_default=True,
         metavar="N",
@@ -112,7 +114,7 @@ def compare_files(
     passed = all(finding.passed for finding in answer["checks"])
     if as_json:
         checks = [finding.as_dict() for finding in answer["checks"]]
-        options.print_json("compare", {"a": a, "b": b, "passed": passed, **answer, "checks": checks})
+        print_json("compare", {"a": a, "b": b, "passed": passed, **answer, "checks": checks})
     elif not quiet:
         click.echo("\n".join(_lines(files.shown_name(b, "stdin"), answer)))
     if not passed:

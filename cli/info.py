@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from curvify.cli import options
+from curvify.cli.answers import print_json
 from curvify.cli.group import COMMANDS, Command
 from curvify.cli.surfaces import with_refine_options
 
@@ -54,7 +55,7 @@ def info_file(input: str, input_format: str | None, as_json: bool, quiet: bool, 
         coarse = None
     answer = {"input": input, **describe_prepared(mesh, coarse), "refine": prediction(mesh, coarse, asked)}
     if as_json:
-        options.print_json("info", answer)
+        print_json("info", answer)
     else:
         from curvify.cli.info_text import as_text
 

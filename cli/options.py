@@ -7,8 +7,8 @@ from typing import Any, TypeVar
 
 import click
 
-from curvify import __version__
 from curvify.cli.group import Option
+from curvify.cli.parameters import FILE, POSITIVE, Length, Number, Whole
 from curvify.schemes import NAMES
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -25,43 +25,8 @@ SURFACE, SIMPLIFYING, SHARP, TRIMMING, MESH, OUTPUT, RUNNING, MESSAGES = (
 )
 
 
-class Whole(click.IntRange):
-    """Whole numbers in a range; click's own message calls what is none "not a valid integer range"."""
-
-    name = "whole number"
-
-
-class Number(click.FloatRange):
-    """Numbers in a range."""
-
-    name = "number"
-
-
-POSITIVE = Whole(min=1)
-#: IN and OUT; what cannot be read is told by the reader.
-FILE = click.Path(allow_dash=True, readable=False)
-DEGREES = Number(min=0, max=180)
 #: More faces than this in one range are a slip of the keyboard.
 MOST_FACES = 10_000_000
-
-
-class Length(click.ParamType):  # type: ignore[type-arg,unused-ignore]
-    """A length in units of the file, or with ``%`` a share of the diagonal: ``(number, is_share)``."""
-
-    name = "length"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, bool]:
-        """The number and whether it is a share."""
-        if isinstance(value, tuple):
-            return value
-        share = value.endswith("%")
-        try:
-            number = float(value[:-1]) / 100 if share else float(value)
-        except ValueError:
-            number = -1.0
-        if not 0 <= number < float("inf"):
-            self.fail(f"'{value}' is not a length; give a number from 0 on, or a share of the diagonal such as 0.01%")
-        return number, share
 
 
 def option(heading: str, *names: str, **attributes: Any) -> Callable[[Function], Function]:
@@ -434,18 +399,3 @@ messages = with_options(quiet, verbose)
 
 #: Where a command that changes polygons writes them, and how.
 polygons_out = with_options(input_format, output_format, precision, as_text, no_clobber, messages)
-
-#: Version of what is told as JSON.
-SCHEMA = 1
-
-
-def stamped(command: str, answer: dict[str, Any]) -> dict[str, Any]:
-    """What a command tells as JSON, with what made it and a version of its form."""
-    return {"schema": SCHEMA, "curvify": __version__, "command": command, **answer}
-
-
-def print_json(command: str, answer: dict[str, Any]) -> None:
-    """Print what a command found as JSON."""
-    import json
-
-    click.echo(json.dumps(stamped(command, answer), indent=2))

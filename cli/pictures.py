@@ -9,6 +9,7 @@ import click
 
 from curvify.cli import options
 from curvify.cli.options import option
+from curvify.cli.parameters import FILE, POSITIVE, Limits
 from curvify.records import record
 
 if TYPE_CHECKING:
@@ -21,26 +22,6 @@ PICTURE, LOOK = "Picture", "Look"
 EXTREME = 0.01
 
 
-class Limits(click.ParamType):  # type: ignore[type-arg,unused-ignore]
-    """Two numbers in order, ``LOW,HIGH``."""
-
-    name = "limits"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
-        """The two numbers."""
-        if isinstance(value, tuple):
-            return value
-        try:
-            low, high = (float(part) for part in value.split(","))
-        except ValueError:
-            low, high = 1.0, 0.0
-        if not (float("-inf") < low <= high < float("inf")):
-            self.fail(f"'{value}' is not a range; give two numbers in order, as in 0,2.5")
-        return low, high
-
-
-
-
 def _some_meshes(context: click.Context, _: click.Parameter, inputs: tuple[str, ...]) -> tuple[str, ...]:
     """The INs; without any, the one name that was given is OUT's."""
     if not inputs and not context.resilient_parsing:
@@ -49,8 +30,8 @@ def _some_meshes(context: click.Context, _: click.Parameter, inputs: tuple[str, 
 
 
 in_and_out = options.with_options(
-    click.argument("inputs", metavar="IN...", nargs=-1, callback=_some_meshes, type=options.FILE),
-    click.argument("output", metavar="OUT", type=options.FILE),
+    click.argument("inputs", metavar="IN...", nargs=-1, callback=_some_meshes, type=FILE),
+    click.argument("output", metavar="OUT", type=FILE),
 )
 
 style = option(
@@ -91,7 +72,7 @@ control = option(LOOK, "--control", metavar="FILE", help="Draw the edges and ver
 stripes = option(
     LOOK,
     "--stripes",
-    type=options.POSITIVE,
+    type=POSITIVE,
     default=10,
     show_default=True,
     metavar="N",

@@ -9,6 +9,7 @@ import click
 
 from curvify.cli import options, pictures
 from curvify.cli.group import COMMANDS, Command
+from curvify.cli.parameters import POSITIVE, Number, Whole
 
 if TYPE_CHECKING:
     from curvify.gpu.scene import Panel, Settings
@@ -49,7 +50,7 @@ EXAMPLES = (
     options.option(
         pictures.PICTURE,
         "--turntable",
-        type=options.Whole(1, 360),
+        type=Whole(1, 360),
         default=1,
         metavar="N",
         help="Draw each IN N times in a row, turned all around.",
@@ -69,7 +70,7 @@ EXAMPLES = (
     options.option(
         pictures.PICTURE,
         "--field-of-view",
-        type=options.Number(0, 120),
+        type=Number(0, 120),
         default=24.0,
         show_default=True,
         metavar="DEG",
@@ -94,7 +95,7 @@ EXAMPLES = (
     options.option(
         pictures.PICTURE,
         "--columns",
-        type=options.POSITIVE,
+        type=POSITIVE,
         metavar="N",
         help="Pictures in a row.  [default: all INs, or the N of --turntable]",
     ),

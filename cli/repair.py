@@ -8,6 +8,7 @@ import click
 
 from curvify.cli import options
 from curvify.cli.group import COMMANDS, Command
+from curvify.cli.parameters import Whole
 
 EXAMPLES = (
     ("What is wrong, and the same mended", "curvify info coarse.obj && curvify repair coarse.obj mended.obj -v"),
@@ -24,7 +25,7 @@ EXAMPLES = (
     options.option(
         "Repair",
         "--holes",
-        type=options.Whole(min=0),
+        type=Whole(min=0),
         default=0,
         show_default=True,
         metavar="N",

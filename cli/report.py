@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from curvify.cli.options import stamped
+from curvify.cli.answers import stamped
 from curvify.mesh import Floats, Ints
 from curvify.polygons import newell_normals
 from curvify.quality import edge_angles
